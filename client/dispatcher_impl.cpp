@@ -133,15 +133,20 @@ bool Dispatcher::Impl::tryStep() {
   const DepthGuard inside(depth_);
   if (depth_ == 1) bindings_.dropRemoved();
   bool hasActed = endpoint().takeLocalEvent() && handleLocalHints();
+  if (takeFrom(endpoint().nextPolled())) return true;
+  // Reached in some steps also while there are always messages.
   hasActed = bindings_.resume() || hasActed;
-  if (const auto index = endpoint().next()) {
-    auto* binding = parts_.linkOwners.find(*index);
-    // A binding that a callback removes stays alive until the next step.
-    if (binding != nullptr && binding->takeSome(kBatch)) return true;
-  }
+  hasActed = takeFrom(endpoint().nextOther()) || hasActed;
   if (!parts_.timer.isDue()) return hasActed;
   bindings_.handleDue();
   return true;
+}
+
+bool Dispatcher::Impl::takeFrom(MaybeIndex index) {
+  if (!index) return false;
+  auto* const binding = parts_.linkOwners.find(*index);
+  // A binding that a callback removes stays alive until the next step.
+  return binding != nullptr && binding->takeSome(kBatch);
 }
 
 void Dispatcher::Impl::interrupt() noexcept {

@@ -68,6 +68,7 @@ class Dispatcher::Impl {
   bool takeStop() noexcept;
   bool step();
   bool tryStep();
+  bool takeFrom(MaybeIndex index);
   void dropKnocks() noexcept;
   bool handleLocalHints();
 

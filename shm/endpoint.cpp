@@ -12,9 +12,11 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kClockEvery = 32;  // spins between readings of the clock
+constexpr std::uint32_t kHintsEvery = 16;  // messages of polled links between looks at hints
+constexpr int kLooksAtPolled = 4;  // in each spin
+constexpr std::uint32_t kClockEvery = 8;  // spins between readings of the clock
 // spins between scans of all links; WaitMode::spin then also gives up the processor once
-constexpr std::uint32_t kScanEvery = 1u << 14;
+constexpr std::uint32_t kScanEvery = 1u << 12;
 constexpr std::uint32_t kScanAllEvery = 1024;  // looks at the hints between scans of all links
 // with at most this number of links, a scan of all links costs next to nothing
 constexpr std::size_t kFewLinks = 64;
@@ -81,25 +83,28 @@ void Endpoint::release(std::uint32_t index, Link& link) noexcept {
   window_.ring();
 }
 
-MaybeIndex Endpoint::nextAfterHints() noexcept {
+MaybeIndex Endpoint::nextOther() noexcept {
+  if (polledLeft_ != 0) return nextReady();
   if (armed_) disarm();
-  if (areHintsDue()) {
-    if (const auto index = nextCold()) return index;
-  }
+  if (const auto index = nextCold()) return index;
   return next();
 }
 
-// Takes one message of each ready link. The round ends when the index wraps around.
+// Takes one message of each ready link. The round ends when the index wraps around; then the polled
+// links have their turns. If these are as many as there may be, each has one turn, because an
+// unpolled link that is busy waits longer.
 MaybeIndex Endpoint::nextCold() noexcept {
   const auto from = readyBits_.position();
   const auto index = nextReady();
-  if (!index || *index < from) sinceHints_ = 0;
+  if (!index || *index < from)
+    polledLeft_ = hot_.size() == HotLinks::kCapacity ? HotLinks::kCapacity : kHintsEvery;
   return index;
 }
 
 MaybeIndex Endpoint::nextReady() noexcept {
   if (revisit_) {
     if (isRevisitDue()) readyBits_.set(*revisit_);
+    else if (isAttached(*revisit_)) links_[*revisit_]->incoming().onEmpty();
     revisit_.reset();
   }
   if (++sinceScan_ >= kScanAllEvery) {
@@ -145,7 +150,11 @@ bool Endpoint::spin(Deadline deadline) noexcept {
   const bool yields = isAdaptive && spinBudget_.takeYielding();
   std::int64_t startNs = 0;
   for (std::uint32_t spins = 1;; ++spins) {
-    cpuRelax();
+    // Messages of polled links are the events that need a fast reaction.
+    for (int looks = 0; looks < kLooksAtPolled; ++looks) {
+      cpuRelax();
+      if (hot_.hasMessage()) return true;
+    }
     if (hasEvents()) return true;
     if (spins % kClockEvery != 0) continue;
     const auto nowNs = Clock::nowNs();
@@ -213,6 +222,7 @@ bool Endpoint::arm() noexcept {
   announce(layout::SleepState::onDescriptor);
   tryScanAllLinks();
   armed_ = true;
+  polledLeft_ = 0;
   if (!hasEvents()) return true;
   disarm();
   return false;

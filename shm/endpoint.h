@@ -62,12 +62,18 @@ class Endpoint {
   // Index of a link that may have a message or a change of state; nothing if there is no such link
   // now. The caller takes one message of this link.
   MaybeIndex next() noexcept {
-    if (armed_ || areHintsDue()) return nextAfterHints();
+    if (const auto index = nextPolled()) return index;
+    return nextOther();
+  }
+  // The two halves of next(). A link that nextPolled() returns has a message. If it returns none,
+  // the caller may handle control events, and then calls nextOther().
+  MaybeIndex nextPolled() noexcept {
+    if (polledLeft_ == 0) return {};
     const auto index = hot_.next();
-    if (!index) return nextReady();
-    ++sinceHints_;
+    if (index) --polledLeft_;
     return index;
   }
+  MaybeIndex nextOther() noexcept;
   // Whether there may be an event that is not one of a link: a knock, a rescan or a local event.
   // Cheap: three loads.
   [[nodiscard]] bool hasControlEvents() const noexcept {
@@ -107,16 +113,6 @@ class Endpoint {
   [[nodiscard]] bool slept() const noexcept { return slept_; }
 
  private:
-  static constexpr std::uint32_t kHintsEvery =
-      16;  // messages of polled links between looks at hints
-
-  // The polled links have had their turns. The next turn goes to another link: while all polled
-  // links are busy, the other links would never be reached.
-  [[nodiscard]] bool areHintsDue() const noexcept {
-    return sinceHints_ >= kHintsEvery ||
-           (sinceHints_ >= HotLinks::kCapacity && hot_.size() == HotLinks::kCapacity);
-  }
-  MaybeIndex nextAfterHints() noexcept;
   MaybeIndex nextReady() noexcept;
   MaybeIndex nextCold() noexcept;
   [[nodiscard]] bool isAttached(std::uint32_t index) const noexcept {
@@ -138,7 +134,8 @@ class Endpoint {
   ReadyBits readyBits_;
   HotLinks hot_;
   Knocks knocks_;
-  std::uint32_t sinceHints_ = 0;  // messages of polled links since the last look at the hints
+  // Messages of polled links before the next look at the hints; 0 also while armed.
+  std::uint32_t polledLeft_ = 0;
   std::uint32_t sinceScan_ = 0;  // looks at the hints since the last scan of all links
   // A link that is not polled and may have further messages after the one that was taken.
   std::optional<std::uint32_t> revisit_;

@@ -38,6 +38,7 @@ void HotLinks::removeAll() noexcept {
 
 void HotLinks::noteEvents(const Hot& cooled) noexcept {
   if (cooled.link->hasEvents()) readyBits_.set(cooled.index);
+  else cooled.link->incoming().onEmpty();
 }
 
 MaybeIndex HotLinks::cool(std::size_t place) noexcept {

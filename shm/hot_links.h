@@ -30,6 +30,8 @@ class HotLinks {
   static constexpr std::uint32_t kUnfencedAfter = 1024;
 
   explicit HotLinks(ReadyBits& readyBits) noexcept : readyBits_(readyBits) {}
+  HotLinks(const HotLinks&) = delete;
+  HotLinks& operator=(const HotLinks&) = delete;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   // Polls a link from now on, in place of idle ones if necessary. Returns false, and the link is
@@ -48,16 +50,16 @@ class HotLinks {
   // Index of the next polled link that has a message; links take turns. Nothing if there is no
   // message, or if polling of an idle link has ended.
   MaybeIndex next() noexcept {
-    for (std::size_t looked = 0; looked < size_; ++looked) {
-      turn_ = turn_ + 1 < size_ ? turn_ + 1 : 0;
-      auto& hot = hot_[turn_];
+    for (auto looks = size_; looks != 0; --looks) {
+      if (++turn_ >= hot_.data() + size_) turn_ = hot_.data();
+      auto& hot = *turn_;
       if (hot.link->incoming().hasMessage()) {
         hot.misses = 0;
         if (++hot.turns == kUnfencedAfter) hot.link->letPeerSendUnfenced();
         return hot.index;
       }
       if (++hot.misses == 1) hot.link->incoming().onEmpty();
-      if (hot.misses >= kCoolAfter) return cool(turn_);
+      if (hot.misses >= kCoolAfter) return cool(static_cast<std::size_t>(turn_ - hot_.data()));
     }
     return {};
   }
@@ -71,13 +73,13 @@ class HotLinks {
   };
   // Stops polling the link at `place`; returns its index if a message has arrived.
   MaybeIndex cool(std::size_t place) noexcept;
-  // Sets the ready bit if the link has an event.
+  // Sets the ready bit if the link has an event; frees all its slots if it has none.
   void noteEvents(const Hot& cooled) noexcept;
 
   ReadyBits& readyBits_;
   std::array<Hot, kCapacity> hot_{};
   std::size_t size_ = 0;
-  std::size_t turn_ = 0;
+  Hot* turn_ = hot_.data();  // the link that had its turn last
 };
 
 }  // namespace mpf

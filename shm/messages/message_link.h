@@ -27,12 +27,8 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   [[nodiscard]] Link& link() noexcept { return *link_; }
   [[nodiscard]] BiasedLock& lock() noexcept { return *lock_; }
 
-  // Whether there is a message to begin. If not, frees the slots of all that were taken.
-  [[nodiscard]] bool hasMessage() noexcept {
-    if (link_->incoming().hasMessage()) return true;
-    link_->incoming().onEmpty();
-    return false;
-  }
+  // Whether there is a message to begin.
+  [[nodiscard]] bool hasMessage() noexcept { return link_->incoming().hasMessage(); }
   // Begins the next message, after hasMessage(): copies its envelope and counts it as taken.
   // Returns false if the envelope is invalid.
   [[nodiscard]] bool tryBegin(Envelope& envelope) noexcept {

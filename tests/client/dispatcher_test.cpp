@@ -90,6 +90,36 @@ TEST_F(ClientTest, AnInterruptEndsADispatcherThatIsNeverIdle) {
   EXPECT_LT(replies, 100);
 }
 
+TEST_F(ClientTest, ARequestExpiresWhileAnotherClientAlwaysHasMessages) {
+  auto& server = startServer();
+  server.on<Int32>([](Int32&) {});
+  MessageServer silent(backplane_, "silent");
+  std::optional<Fate> fate;
+  MessageClient patient(dispatcher_, [&](const Message& message) { fate = fateOf(message); });
+  MessageClient busy(dispatcher_, [&](const Message& message) {
+    if (message.getType() != MessageType::int32) return;
+    ASSERT_EQ(busy.send(Int32Message()), SendResult::sent);
+    while (server.handleOne()) {
+    }
+  });
+  patient.bind("silent");
+  busy.bind("device[0]/a");
+  runUntil([&] {
+    silent.handleOne();
+    return patient.isConnected() && busy.isConnected();
+  });
+  ASSERT_EQ(busy.send(Int32Message()), SendResult::sent);
+  while (server.handleOne()) {
+  }
+  const auto deadline = Deadline::after(1ms);
+  ASSERT_EQ(patient.send(Int32Message(), deadline), SendResult::sent);
+
+  while (!deadline.hasPassed()) dispatcher_.runOnce();
+  for (int runs = 0; runs < 100 && !fate; ++runs) dispatcher_.runOnce();
+
+  EXPECT_EQ(fate, Fate::expired);
+}
+
 // Callbacks of one client never run at the same time, whichever threads send.
 TEST(SharedDispatcher, RunsOneCallbackAtATimeForManyThreads) {
   const Watchdog watchdog("shared dispatcher");

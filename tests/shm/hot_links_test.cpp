@@ -88,6 +88,19 @@ TEST_F(HotLinksTest, AnEventIsAnnouncedByTheReadyBitWhenPollingEnds) {
   EXPECT_FALSE(takeReadyBit());
 }
 
+TEST_F(HotLinksTest, TheSlotsOfALinkWithoutAMessageAreFreedWhenPollingEnds) {
+  makeLinks(1);
+  ASSERT_TRUE(tryAdd(0));
+  const auto& freed = links_[0].server.control().requests.freed;
+  ASSERT_EQ(send(links_[0].client, 1), LinkSend::sent);
+  ASSERT_TRUE(server_->tryTake(links_[0].serverIndex));
+  ASSERT_EQ(freed.load(std::memory_order_relaxed), 0u) << "less than a batch";
+
+  hot_->removeAll();
+
+  EXPECT_EQ(freed.load(std::memory_order_relaxed), 1u);
+}
+
 TEST_F(HotLinksTest, TheEndOfALinkIsAnEvent) {
   makeLinks(1);
   ASSERT_TRUE(tryAdd(0));
