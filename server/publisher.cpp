@@ -74,8 +74,9 @@ void FanOutBodies::takeBack(std::byte* data, std::size_t) noexcept {
 
 // ---- publisher
 
-Publisher::Publisher(const std::string& backplane, OwnWindow& window, const ServerOptions& options)
-    : control_(window.control()),
+Publisher::Publisher(const std::string& backplane, OwnWindow& window, ReplyCounts& counts,
+                     const ServerOptions& options)
+    : counts_(counts),
       serverWindow_(window.header().incarnation),
       maxBorrowed_(checkedMaxBorrowed(options.maxBorrowed)),
       stamps_(options.stampsReplies),
@@ -111,9 +112,9 @@ std::size_t Publisher::publish(const Message& message, std::span<const Message> 
   const auto chunk = isShared ? bodies_->tryFind(message.body().data()) : tryCopy(message.body());
   std::size_t sent = 0;
   for (std::size_t i = 0; i < requests.size(); ++i) {
-    const auto result = send(message, requests[i], chunk, kOwnCount);
+    const auto result = send(message, requests[i], chunk, std::nullopt);
     if (result == ReplyResult::sent) ++sent;
-    else if (result != ReplyResult::clientGone) count(control_.replyQueueFull);
+    else if (result != ReplyResult::clientGone) counts_.notSent();
     if (i < results.size()) results[i] = result;
   }
   if (chunk && !isShared) chunk->drop();
@@ -128,8 +129,7 @@ ReplyResult Publisher::relay(const Message& message, std::uint32_t missed) noexc
 }
 
 ReplyResult Publisher::send(const Message& message, const Message& request,
-                            const std::shared_ptr<FanOutChunk>& chunk,
-                            std::uint32_t missed) noexcept {
+                            const std::shared_ptr<FanOutChunk>& chunk, Missed missed) noexcept {
   if (!message || request.route().link == 0 || forkGuard_.isInherited())
     return ReplyResult::clientGone;
   auto& connection = Connection::of(request.route());
@@ -139,7 +139,7 @@ ReplyResult Publisher::send(const Message& message, const Message& request,
 
 ReplyResult Publisher::sendLocked(Connection& connection, const Message& message,
                                   const Message& request, const std::shared_ptr<FanOutChunk>& chunk,
-                                  std::uint32_t missed) noexcept {
+                                  Missed missed) noexcept {
   const auto route = request.route();
   if (!connection.isOpenFor(route)) return ReplyResult::clientGone;
   auto& link = connection.channel->link();
@@ -158,16 +158,15 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   const Link::Limits limits{0, first ? 0 : link.maxOutstanding()};
   const auto bytes = message.body().size();
   const auto result =
-      missed == kOwnCount
-          ? link.trySendFanOut(envelope, chunk, bytes, limits, maxBorrowed_)
-          : link.tryRelayFanOut(envelope, chunk, bytes, limits, maxBorrowed_, missed);
+      missed ? link.tryRelayFanOut(envelope, chunk, bytes, limits, maxBorrowed_, *missed)
+             : link.trySendFanOut(envelope, chunk, bytes, limits, maxBorrowed_);
   if (result != LinkSend::sent) return resultOf(result);
   MPF_STEP(reply_sent);
   if (first) connection.owed(route.requestId).store(0, std::memory_order_relaxed);
-  count(control_.sent);
+  counts_.sent();
   link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
   if (route.requestId == connection.timedId && first) {
-    record(control_.serviceNs, Clock::nowNs() - connection.timedFromNs);
+    counts_.service(Clock::nowNs() - connection.timedFromNs);
     connection.timedId = 0;
   }
   if (link.borrowedFanOut() == 1) noteBorrower(connection.channel);

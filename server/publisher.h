@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,7 @@
 #include <mpf/message_server.h>
 
 #include "server/connection.h"
+#include "server/reply_counts.h"
 #include "shm/fan_out_pool.h"
 #include "shm/fork_guard.h"
 #include "shm/window.h"
@@ -44,7 +46,8 @@ class FanOutBodies final : public BodyLender, public std::enable_shared_from_thi
 class Publisher {
  public:
   //   throws  std::invalid_argument when options.maxBorrowed is out of range
-  Publisher(const std::string& backplane, OwnWindow& window, const ServerOptions& options);
+  Publisher(const std::string& backplane, OwnWindow& window, ReplyCounts& counts,
+            const ServerOptions& options);
 
   // A body in the fan-out pool, or on the heap if the pool has no chunk for it.
   //   throws  std::bad_alloc
@@ -57,20 +60,19 @@ class Publisher {
   ReplyResult relay(const Message& message, std::uint32_t missed) noexcept;
 
  private:
-  // As the missed messages that publish() counts itself.
-  static constexpr std::uint32_t kOwnCount = UINT32_MAX;
-
   std::shared_ptr<FanOutChunk> tryAlloc(std::size_t bytes) noexcept;
   std::shared_ptr<FanOutChunk> tryCopy(std::span<const std::byte> body) noexcept;
+  // The number of dropped messages that the client is told; nullopt: the link counts them.
+  using Missed = std::optional<std::uint32_t>;
   ReplyResult send(const Message& message, const Message& request,
-                   const std::shared_ptr<FanOutChunk>& chunk, std::uint32_t missed) noexcept;
+                   const std::shared_ptr<FanOutChunk>& chunk, Missed missed) noexcept;
   ReplyResult sendLocked(Connection& connection, const Message& message, const Message& request,
-                         const std::shared_ptr<FanOutChunk>& chunk, std::uint32_t missed) noexcept;
+                         const std::shared_ptr<FanOutChunk>& chunk, Missed missed) noexcept;
   void noteBorrower(const std::shared_ptr<MessageLink>& channel) noexcept;
   void collectReturned() noexcept;
 
   ForkGuard forkGuard_;
-  layout::WindowControl& control_;
+  ReplyCounts& counts_;
   std::uint64_t serverWindow_;
   std::uint32_t maxBorrowed_;
   bool stamps_;

@@ -2,12 +2,10 @@
 #include "server/reply_sender.h"
 
 #include <memory>
-#include <mutex>
 
 #include <mpf/clock.h>
 
 #include "base/step.h"
-#include "shm/histogram.h"
 
 namespace mpf {
 
@@ -56,7 +54,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
     ++sent.count;
   }
   if (const auto number = link.outgoing().messages() - sentBefore; number != 0)
-    count(control_.sent, number);
+    counts_.sent(number);
   return sent;
 }
 
@@ -64,7 +62,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
                                                                      Message& message) noexcept {
   if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
   const auto result = sendLocked(connection, message);
-  if (result == ReplyResult::sent) count(control_.sent);
+  if (result == ReplyResult::sent) counts_.sent();
   return result;
 }
 
@@ -101,12 +99,12 @@ void ReplySender::noteReplied(Connection& connection, Message& message) noexcept
   const auto requestId = message.route().requestId;
   connection.owed(requestId).store(0, std::memory_order_relaxed);
   if (requestId != connection.timedId) return;
-  record(control_.serviceNs, Clock::nowNs() - connection.timedFromNs);
+  counts_.service(Clock::nowNs() - connection.timedFromNs);
   connection.timedId = 0;
 }
 
 ReplyResult ReplySender::noteRefused(LinkSend result) noexcept {
-  count(control_.replyQueueFull);
+  counts_.notSent();
   if (result == LinkSend::full) return ReplyResult::queueFull;
   return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
 }
@@ -125,7 +123,7 @@ void ReplySender::refuseAbandoned(const Route& route) noexcept {
   if (!connection.isOpenFor(route) || !connection.owes(route.requestId)) return;
   Message message = RequestFateMessage({.fate = Fate::refused, .requestId = route.requestId});
   message.setRoute(connection.routeOf(route.requestId, nullptr));
-  if (sendOneLocked(connection, message) == ReplyResult::sent) count(control_.refused);
+  if (sendOneLocked(connection, message) == ReplyResult::sent) counts_.refused();
 }
 
 BodyBytes ReplySender::allocate(const Route& route, std::size_t bytes) {

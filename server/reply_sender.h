@@ -13,16 +13,15 @@
 #include <mpf/message_server.h>
 
 #include "server/connection.h"
+#include "server/reply_counts.h"
 #include "shm/fork_guard.h"
 
 namespace mpf {
 
 class ReplySender {
  public:
-  // Counts what it sends in `control`.
   //   stamps  give replies without a time stamp the time at which they are sent
-  ReplySender(layout::WindowControl& control, bool stamps) noexcept
-      : control_(control), stamps_(stamps) {}
+  ReplySender(ReplyCounts& counts, bool stamps) noexcept : counts_(counts), stamps_(stamps) {}
 
   // MessageServer::reply().
   ReplyResult send(Message& message) noexcept;
@@ -39,13 +38,13 @@ class ReplySender {
  private:
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
-  // The caller counts what was sent in `control_`.
+  // The caller counts what was sent.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
   void noteReplied(Connection& connection, Message& message) noexcept;
   ReplyResult noteRefused(LinkSend result) noexcept;
 
   ForkGuard forkGuard_;
-  layout::WindowControl& control_;
+  ReplyCounts& counts_;
   const bool stamps_;
 };
 

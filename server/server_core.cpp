@@ -2,7 +2,6 @@
 #include "server/server_core.h"
 
 #include <fmt/format.h>
-#include <mutex>
 #include <stdexcept>
 
 #include "base/step.h"
@@ -50,8 +49,9 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
           }),
       connections_(endpoint_),
       acceptor_(endpoint_, connections_),
-      replies_(endpoint_.control(), options.stampsReplies),
-      publisher_(backplane.name(), endpoint_.window(), options),
+      replyCounts_(endpoint_.control()),
+      replies_(replyCounts_, options.stampsReplies),
+      publisher_(backplane.name(), endpoint_.window(), replyCounts_, options),
       keeper_(RequestKeeper::make(replies_)),
       progress_(endpoint_.control()) {}
 
@@ -106,20 +106,22 @@ inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestI
   takeBefore_ = times.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(times.deadlineNs);
 }
 
+// Of a link that may have no message.
+bool ServerCore::hasRequest(Connection& connection) noexcept {
+  if (!connection.channel) return false;
+  if (connection.channel->hasMessage()) return true;
+  connections_.closeIfClientDid(connection);
+  return false;
+}
+
 [[gnu::always_inline]] inline bool ServerCore::tryBegin(Connection& connection,
                                                         Envelope& envelope) noexcept {
-  if (!connection.channel) return false;
-  if (!connection.channel->hasMessage()) {
-    connections_.closeIfClientDid(connection);
-    return false;
-  }
   if (!connection.channel->tryBegin(envelope)) {
     closeForProtocolError(connection);
     return false;
   }
   auto& control = endpoint_.control();
   count(control.received);
-  count(control.progress);
   if (!connection.tryOwe(envelope.requestId)) {
     closeForProtocolError(connection);
     return false;
@@ -149,7 +151,7 @@ Message ServerCore::finishLong(Connection& connection, BodyFields fields, Reques
       closeForProtocolError(connection);
       break;
     case MessageLink::Finish::unavailable:
-      count(endpoint_.control().refused);
+      replyCounts_.refused();
       replies_.sendFate(connection, marks, Fate::refused);
       break;
     case MessageLink::Finish::message:
@@ -164,15 +166,16 @@ Message ServerCore::receive() {
   endpoint_.forkGuard().check("MessageServer");
   // Limited, because faulty clients may set hints without end, and receive() must return.
   for (std::uint32_t looks = 0; looks < kMaxLooks; ++looks) {
-    if (endpoint_.hasControlEvents()) handleControlEvents();
-    if (connections_.hasThrown()) throwNext();
-    const auto index = endpoint_.next();
+    auto index = endpoint_.nextPolled();
+    const bool isPolled{index};
+    if (!isPolled) index = nextOther();
     if (!index) {
       if (hasDescriptor_ && !endpoint_.arm()) continue;
       endHandling();
       return {};
     }
     auto& connection = *connections_.all()[*index];
+    if (!isPolled && !hasRequest(connection)) continue;
     Envelope envelope;
     if (!tryBegin(connection, envelope)) continue;
     // The message is made in the memory of the caller.
@@ -184,6 +187,14 @@ Message ServerCore::receive() {
   endHandling();
   keepReadable();
   return {};
+}
+
+// What receive() does less often than for each message.
+MaybeIndex ServerCore::nextOther() {
+  replyCounts_.noteServerThread();
+  if (endpoint_.hasControlEvents()) handleControlEvents();
+  if (connections_.hasThrown()) throwNext();
+  return endpoint_.nextOther();
 }
 
 void ServerCore::keepReadable() noexcept {
@@ -224,7 +235,8 @@ ServerCore::Counts ServerCore::counts() const {
   const auto& control = endpoint_.control();
   Counts counts{control.queueSize.load(std::memory_order_relaxed), 0,
                 control.received.load(std::memory_order_relaxed), 0,
-                control.sent.load(std::memory_order_relaxed)};
+                control.sent.load(std::memory_order_relaxed) +
+                    control.sentElsewhere.load(std::memory_order_relaxed)};
   for (const auto& connection : connections_.all()) {
     const BiasedLock::Guard lock(*connection->lock);
     if (!connection->channel) continue;

@@ -22,6 +22,7 @@
 #include "server/connections.h"
 #include "server/progress.h"
 #include "server/publisher.h"
+#include "server/reply_counts.h"
 #include "server/reply_sender.h"
 #include "server/request_keeper.h"
 #include "shm/endpoint.h"
@@ -68,6 +69,8 @@ class ServerCore {
  private:
   void handleControlEvents();
   void throwNext();
+  MaybeIndex nextOther();
+  bool hasRequest(Connection& connection) noexcept;
   bool tryBegin(Connection& connection, Envelope& envelope) noexcept;
   Message finishShort(Connection& connection, const Envelope& envelope) noexcept;
   struct Times {
@@ -87,6 +90,7 @@ class ServerCore {
   Endpoint endpoint_;
   Connections connections_;
   Acceptor acceptor_;
+  ReplyCounts replyCounts_;
   ReplySender replies_;
   Publisher publisher_;
   RequestKeeper& keeper_;

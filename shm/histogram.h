@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Histograms in shared memory: counts durations in buckets.
 //
-// Threads  one thread adds; any thread of any process reads.
+// Threads  one thread adds, but recordFromAnyThread(): any. Any thread of any process reads.
 #pragma once
 
 #include <algorithm>
@@ -39,6 +39,15 @@ inline void record(layout::Histogram& histogram, std::int64_t ns) noexcept {
   count(histogram.buckets[HistogramBuckets::indexOf(value)]);
   if (value > histogram.maxNs.load(std::memory_order_relaxed))
     histogram.maxNs.store(value, std::memory_order_relaxed);
+}
+// As record(), for a histogram to which threads add only in this way.
+inline void recordFromAnyThread(layout::Histogram& histogram, std::int64_t ns) noexcept {
+  const auto value = static_cast<std::uint64_t>(std::max<std::int64_t>(ns, 0));
+  histogram.buckets[HistogramBuckets::indexOf(value)].fetch_add(1, std::memory_order_relaxed);
+  auto longest = histogram.maxNs.load(std::memory_order_relaxed);
+  while (value > longest &&
+         !histogram.maxNs.compare_exchange_weak(longest, value, std::memory_order_relaxed)) {
+  }
 }
 
 }  // namespace mpf

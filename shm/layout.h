@@ -157,10 +157,9 @@ struct WindowControl {
   // requests of one client that may wait, for links created from now on (server windows)
   Word32 queueSize;
   std::atomic<Shortage> shortage;  // why the server cannot accept a client now
-  Word64 progress;  // grows with every message handled
-  Word64 progressAtNs;  // CLOCK_MONOTONIC when `progress` was last sampled
+  Word64 progressAtNs;  // CLOCK_MONOTONIC when `received` was last sampled
   alignas(kPairBytes) Word64 received;  // messages taken
-  Word64 sent;  // messages pushed
+  Word64 sent;  // messages pushed by the thread that takes messages
   Word64 replyQueueFull;  // replies refused because the client did not take them
   // client windows: sends refused because the server's queue was full or too many requests were
   // unanswered
@@ -176,7 +175,8 @@ struct WindowControl {
   // thread of the shared dispatcher, where no caller can catch them
   Word64 alarms;
   Word64 handling;  // the request that a server works on, see Handling; 0: none
-  std::array<Word64, (kHistogramBuckets / 4) - 2> reserved;
+  Word64 sentElsewhere;  // messages pushed by other threads
+  std::array<Word64, (kHistogramBuckets / 4) - 3> reserved;
   Histogram queueWaitNs;  // from push to take, sampled
   Histogram serviceNs;  // server: from take to reply; client: from send to reply, sampled
 };

@@ -48,7 +48,7 @@ Tree describe(const layout::Histogram& histogram) {
 
 Tree countersOf(const WindowControl& control) {
   return {{"received", value(control.received)},
-          {"sent", value(control.sent)},
+          {"sent", value(control.sent) + value(control.sentElsewhere)},
           {"replyQueueFull", value(control.replyQueueFull)},
           {"expired", value(control.expired)},
           {"refused", value(control.refused)},

@@ -66,7 +66,8 @@ class PublisherTest : public ServerPartsTest {
   }
 
   ServerOptions options_{.maxSharedBytes = 32u << 20, .maxBorrowed = kMaxBorrowed};
-  std::optional<Publisher> publisher_{std::in_place, name(), server_->endpoint.window(), options_};
+  std::optional<Publisher> publisher_{std::in_place, name(), server_->endpoint.window(), counts_,
+                                      options_};
 };
 
 TEST_F(PublisherTest, EachClientReadsTheSameChunkAndGetsTheMarksOfItsOwnRequest) {
@@ -152,7 +153,7 @@ TEST_F(PublisherTest, EachRequestOfAClientIsToldItsOwnNumber) {
 TEST_F(PublisherTest, FindsFreeChunksAlsoWhenNothingCanBeSent) {
   auto subscriber = subscribe();
   options_.maxSharedBytes = 2u << 20;  // four chunks
-  publisher_.emplace(name(), server_->endpoint.window(), options_);
+  publisher_.emplace(name(), server_->endpoint.window(), counts_, options_);
   std::vector<Float64ArrayMessage> kept;
   for (int i = 0; i < kMaxBorrowed; ++i)
     ASSERT_EQ(publish(filled(i), subscriber.request), ReplyResult::sent);
@@ -203,11 +204,11 @@ TEST_F(PublisherTest, RefusesATooLargeMessageWithoutCountingIt) {
 TEST_F(PublisherTest, CountsWhatItHasNoMemoryFor) {
   auto subscriber = subscribe();
   options_.maxSharedBytes = 0;
-  publisher_.emplace(name(), server_->endpoint.window(), options_);
+  publisher_.emplace(name(), server_->endpoint.window(), counts_, options_);
   EXPECT_EQ(filled(0).lender(), &heapLender());
   EXPECT_EQ(publish(filled(0), subscriber.request), ReplyResult::noMemory);
   options_.maxSharedBytes = 1u << 20;
-  publisher_.emplace(name(), server_->endpoint.window(), options_);
+  publisher_.emplace(name(), server_->endpoint.window(), counts_, options_);
 
   ASSERT_EQ(publish(filled(0), subscriber.request), ReplyResult::sent);
 
@@ -239,7 +240,7 @@ TEST_F(PublisherTest, RefusesAnInvalidLimit) {
   for (const int invalid : {0, -1, 65}) {
     options_.maxBorrowed = invalid;
     EXPECT_EQ(whatOf<std::invalid_argument>(
-                  [&] { Publisher(name(), server_->endpoint.window(), options_); }),
+                  [&] { Publisher(name(), server_->endpoint.window(), counts_, options_); }),
               std::to_string(invalid) + " messages that a client may hold: use 1 to 64");
   }
 }

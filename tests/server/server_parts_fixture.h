@@ -42,6 +42,10 @@ class ServerPartsTest : public ShmTest {
     link.incoming().end();
     return envelope;
   }
+  void SetUp() override {
+    ShmTest::SetUp();
+    counts_.noteServerThread();
+  }
   layout::WindowControl& control() { return server_->endpoint.control(); }
   void TearDown() override {
     connections_.closeAll();
@@ -54,7 +58,8 @@ class ServerPartsTest : public ShmTest {
   std::optional<End> client_{std::in_place, backplane_, ""};
   Connections connections_{server_->endpoint};
   Acceptor acceptor_{server_->endpoint, connections_};
-  ReplySender replies_{control(), false};
+  ReplyCounts counts_{control()};
+  ReplySender replies_{counts_, false};
 };
 
 inline std::uint64_t valueOf(const layout::Word64& word) {

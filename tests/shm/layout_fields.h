@@ -64,14 +64,14 @@ inline nlohmann::json layoutFields() {
     using Struct = WindowControl;
     all["WindowControl"] = {
         {"bytes", sizeof(Struct)},
-        {"fields", {MPF_FIELD(sleeping),       MPF_FIELD(sleepNumber),    MPF_FIELD(state),
-                    MPF_FIELD(linkCount),      MPF_FIELD(queueSize),      MPF_FIELD(shortage),
-                    MPF_FIELD(progress),       MPF_FIELD(progressAtNs),   MPF_FIELD(received),
-                    MPF_FIELD(sent),           MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),
-                    MPF_FIELD(expired),        MPF_FIELD(refused),        MPF_FIELD(wakes),
-                    MPF_FIELD(linksOpened),    MPF_FIELD(linksClosed),    MPF_FIELD(peersDied),
-                    MPF_FIELD(protocolErrors), MPF_FIELD(alarms),         MPF_FIELD(handling),
-                    MPF_FIELD(reserved),       MPF_FIELD(queueWaitNs),    MPF_FIELD(serviceNs)}}};
+        {"fields", {MPF_FIELD(sleeping),       MPF_FIELD(sleepNumber), MPF_FIELD(state),
+                    MPF_FIELD(linkCount),      MPF_FIELD(queueSize),   MPF_FIELD(shortage),
+                    MPF_FIELD(progressAtNs),   MPF_FIELD(received),    MPF_FIELD(sent),
+                    MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),   MPF_FIELD(expired),
+                    MPF_FIELD(refused),        MPF_FIELD(wakes),       MPF_FIELD(linksOpened),
+                    MPF_FIELD(linksClosed),    MPF_FIELD(peersDied),   MPF_FIELD(protocolErrors),
+                    MPF_FIELD(alarms),         MPF_FIELD(handling),    MPF_FIELD(sentElsewhere),
+                    MPF_FIELD(reserved),       MPF_FIELD(queueWaitNs), MPF_FIELD(serviceNs)}}};
   }
   {
     using Struct = Histogram;

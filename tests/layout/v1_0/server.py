@@ -57,7 +57,6 @@ class Server(party.Party):
     def look_at(self, end):
         while self.answered < self.limit and end.link.into.has_message():
             self.window.control.count("received")
-            self.window.control.count("progress")
             request = end.link.receive()
             self.show(request)
             self.answer(end.link, request)

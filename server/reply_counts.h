@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// ReplyCounts: counts in the window of a server what its threads send.
+//
+// Threads  any.
+#pragma once
+
+#include <cstdint>
+
+#include "base/thread_number.h"
+#include "shm/histogram.h"
+
+namespace mpf {
+
+class ReplyCounts {
+ public:
+  explicit ReplyCounts(layout::WindowControl& control) noexcept : control_(control) {}
+
+  // The calling thread takes the server's requests. Its replies are counted without a locked
+  // instruction.
+  void noteServerThread() noexcept {
+    serverThread_.store(threadNumber(), std::memory_order_relaxed);
+  }
+  void sent(std::uint64_t replies = 1) noexcept {
+    if (serverThread_.load(std::memory_order_relaxed) == threadNumber())
+      count(control_.sent, replies);
+    else control_.sentElsewhere.fetch_add(replies, std::memory_order_relaxed);
+  }
+  void notSent() noexcept { control_.replyQueueFull.fetch_add(1, std::memory_order_relaxed); }
+  // A request ended with the fate `refused`.
+  void refused() noexcept { control_.refused.fetch_add(1, std::memory_order_relaxed); }
+  // The time from a request to its first reply.
+  void service(std::int64_t ns) noexcept { recordFromAnyThread(control_.serviceNs, ns); }
+
+ private:
+  layout::WindowControl& control_;
+  std::atomic<std::uint64_t> serverThread_{0};  // its threadNumber()
+};
+
+}  // namespace mpf
