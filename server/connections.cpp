@@ -34,6 +34,7 @@ void Connections::reportClient(std::uint64_t client, bool isConnected) noexcept 
 } catch (...) {
   try {
     thrown_.push_back(std::current_exception());
+    endpoint_.interrupt();  // the next wait() returns at once
   } catch (const std::bad_alloc&) {  // the exception is lost
   }
 }

@@ -118,6 +118,16 @@ TEST_F(ConnectionsTest, ExceptionsOfTheCallbackAreThrownLaterInTheirOrder) {
   EXPECT_FALSE(connections_.hasThrown());
 }
 
+TEST_F(ConnectionsTest, AnExceptionOfTheCallbackEndsTheNextWait) {
+  auto& connection = accept(createLink());
+  connections_.onClient([](std::uint64_t, bool) { throw std::runtime_error("off"); });
+  static_cast<void>(server_->endpoint.takeLocalEvent());
+
+  connections_.close(connection);
+
+  EXPECT_TRUE(server_->endpoint.hasControlEvents());
+}
+
 // The client has the reply already, and uses the place for its next request.
 TEST_F(ConnectionsTest, ARequestWaitsForTheReplyThatMakesItsPlaceFree) {
   auto& link = createLink();
