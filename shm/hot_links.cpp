@@ -7,7 +7,9 @@ namespace mpf {
 
 bool HotLinks::tryAdd(std::uint32_t index, Link& link) noexcept {
   for (std::size_t place = 0; place < size_; ++place) {
-    if (hot_[place].index == index) return true;
+    if (hot_[place].index != index) continue;
+    hot_[place].misses = 0;  // its owner takes a message now
+    return true;
   }
   for (std::size_t place = 0; place < size_ && size_ == kCapacity; ++place) {
     if (hot_[place].misses >= kReplaceAfter) cool(place);

@@ -73,7 +73,7 @@ class HotLinks {
   };
   // Stops polling the link at `place`; returns its index if a message has arrived.
   MaybeIndex cool(std::size_t place) noexcept;
-  // Sets the ready bit if the link has an event; frees all its slots if it has none.
+  // Sets the ready bit if the link has an event; otherwise frees the slots of the messages taken.
   void noteEvents(const Hot& cooled) noexcept;
 
   ReadyBits& readyBits_;

@@ -101,6 +101,21 @@ TEST_F(HotLinksTest, TheSlotsOfALinkWithoutAMessageAreFreedWhenPollingEnds) {
   EXPECT_EQ(freed.load(std::memory_order_relaxed), 1u);
 }
 
+// The endpoint adds a polled link again when its ready bit is set. Its owner then takes a message.
+TEST_F(HotLinksTest, TheSlotsOfALinkThatIsAddedAgainAreFreedAtTheNextLook) {
+  makeLinks(1);
+  ASSERT_TRUE(tryAdd(0));
+  poll(5);
+  ASSERT_EQ(send(links_[0].client, 1), LinkSend::sent);
+  ASSERT_TRUE(tryAdd(0));
+  ASSERT_TRUE(server_->tryTake(links_[0].serverIndex));
+
+  poll(1);
+
+  const auto& freed = links_[0].server.control().requests.freed;
+  EXPECT_EQ(freed.load(std::memory_order_relaxed), 1u);
+}
+
 TEST_F(HotLinksTest, TheEndOfALinkIsAnEvent) {
   makeLinks(1);
   ASSERT_TRUE(tryAdd(0));
