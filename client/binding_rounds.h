@@ -32,7 +32,9 @@ class BindingRounds {
   void remove(const Binding& binding) noexcept;
   // No callback of a removed binding is in progress.
   void dropRemoved() noexcept {
-    if (!removed_.empty()) removed_.clear();
+    if (removed_.empty()) return;
+    // Moved first: a callback may own a client, whose end calls remove().
+    const auto dropped = std::exchange(removed_, {});
   }
 
   // A process has died: disconnects the bindings whose server it was.
