@@ -134,7 +134,7 @@ bool Dispatcher::Impl::tryStep() {
   if (depth_ == 1) bindings_.dropRemoved();
   bool hasActed = endpoint().takeLocalEvent() && handleLocalHints();
   if (takeFrom(endpoint().nextPolled())) return true;
-  // Reached in some steps also while there are always messages.
+  // nextPolled() returns nothing after some turns, so a busy dispatcher gets here, too.
   hasActed = bindings_.resume() || hasActed;
   hasActed = takeFrom(endpoint().nextOther()) || hasActed;
   if (!parts_.timer.isDue()) return hasActed;

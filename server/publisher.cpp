@@ -11,7 +11,6 @@
 #include <mpf/clock.h>
 
 #include "base/step.h"
-#include "shm/histogram.h"
 
 namespace mpf {
 namespace {

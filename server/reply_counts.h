@@ -4,6 +4,7 @@
 // Threads  any.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 
 #include "base/thread_number.h"
@@ -15,10 +16,12 @@ class ReplyCounts {
  public:
   explicit ReplyCounts(layout::WindowControl& control) noexcept : control_(control) {}
 
-  // The calling thread takes the server's requests. Its replies are counted without a locked
-  // instruction.
+  // The calling thread takes the server's requests. The replies of the first such thread are
+  // counted without a locked instruction; it stays the only writer of this counter.
   void noteServerThread() noexcept {
-    serverThread_.store(threadNumber(), std::memory_order_relaxed);
+    if (serverThread_.load(std::memory_order_relaxed) != 0) return;
+    std::uint64_t none = 0;
+    serverThread_.compare_exchange_strong(none, threadNumber(), std::memory_order_relaxed);
   }
   void sent(std::uint64_t replies = 1) noexcept {
     if (serverThread_.load(std::memory_order_relaxed) == threadNumber())
@@ -33,7 +36,7 @@ class ReplyCounts {
 
  private:
   layout::WindowControl& control_;
-  std::atomic<std::uint64_t> serverThread_{0};  // its threadNumber()
+  std::atomic<std::uint64_t> serverThread_{0};  // its threadNumber(); 0: none yet
 };
 
 }  // namespace mpf

@@ -106,7 +106,7 @@ inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestI
   takeBefore_ = times.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(times.deadlineNs);
 }
 
-// Of a link that may have no message.
+// Whether there is a request. If not, closes the connection if its client has closed the link.
 bool ServerCore::hasRequest(Connection& connection) noexcept {
   if (!connection.channel) return false;
   if (connection.channel->hasMessage()) return true;
@@ -189,7 +189,7 @@ Message ServerCore::receive() {
   return {};
 }
 
-// What receive() does less often than for each message.
+// Also handles what need not be looked at before each request.
 MaybeIndex ServerCore::nextOther() {
   replyCounts_.noteServerThread();
   if (endpoint_.hasControlEvents()) handleControlEvents();

@@ -12,7 +12,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kHintsEvery = 16;  // messages of polled links between looks at hints
+constexpr std::uint32_t kHintsEvery = 16;  // turns of polled links between looks at hints
 constexpr int kLooksAtPolled = 4;  // in each spin
 constexpr std::uint32_t kClockEvery = 8;  // spins between readings of the clock
 // spins between scans of all links; WaitMode::spin then also gives up the processor once
@@ -91,8 +91,8 @@ MaybeIndex Endpoint::nextOther() noexcept {
 }
 
 // Takes one message of each ready link. The round ends when the index wraps around; then the polled
-// links have their turns. If these are as many as there may be, each has one turn, because an
-// unpolled link that is busy waits longer.
+// links have their turns. If as many links are polled as may be, another busy link waits for one
+// turn of each.
 MaybeIndex Endpoint::nextCold() noexcept {
   const auto from = readyBits_.position();
   const auto index = nextReady();

@@ -134,7 +134,7 @@ class Endpoint {
   ReadyBits readyBits_;
   HotLinks hot_;
   Knocks knocks_;
-  // Messages of polled links before the next look at the hints; 0 also while armed.
+  // Turns of polled links before the next look at the hints; 0 also while armed.
   std::uint32_t polledLeft_ = 0;
   std::uint32_t sinceScan_ = 0;  // looks at the hints since the last scan of all links
   // A link that is not polled and may have further messages after the one that was taken.

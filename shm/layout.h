@@ -131,7 +131,7 @@ static_assert(offsetof(SegmentHeader, queueSlots) == 224 &&
               offsetof(SegmentHeader, moreReplySlots) == 312);
 
 // Log-linear histogram of durations [ns]: 4 buckets for each power of two, from 16 ns to 2^40 ns.
-// Written by one thread.
+// Written by one thread, but `serviceNs` of a server by all that reply.
 inline constexpr std::uint32_t kHistogramBuckets = 4 * 37;
 struct Histogram {
   std::array<Word64, kHistogramBuckets> buckets;
@@ -159,7 +159,7 @@ struct WindowControl {
   std::atomic<Shortage> shortage;  // why the server cannot accept a client now
   Word64 progressAtNs;  // CLOCK_MONOTONIC when `received` was last sampled
   alignas(kPairBytes) Word64 received;  // messages taken
-  Word64 sent;  // messages pushed by the thread that takes messages
+  Word64 sent;  // server windows: messages pushed by the first thread that took requests
   Word64 replyQueueFull;  // replies refused because the client did not take them
   // client windows: sends refused because the server's queue was full or too many requests were
   // unanswered
@@ -175,7 +175,7 @@ struct WindowControl {
   // thread of the shared dispatcher, where no caller can catch them
   Word64 alarms;
   Word64 handling;  // the request that a server works on, see Handling; 0: none
-  Word64 sentElsewhere;  // messages pushed by other threads
+  Word64 sentElsewhere;  // server windows: messages pushed by other threads
   std::array<Word64, (kHistogramBuckets / 4) - 3> reserved;
   Histogram queueWaitNs;  // from push to take, sampled
   Histogram serviceNs;  // server: from take to reply; client: from send to reply, sampled

@@ -41,8 +41,8 @@ namespace mpf {
                                         sizeof(layout::MoreSlot::body));
 }
 
-// The consumer frees slots when it has taken kMaxBatch or 1/kFreeFraction of the ring, or when the
-// ring is empty.
+// The consumer frees slots when it has taken kMaxBatch or 1/kFreeFraction of the ring, or when it
+// is told that the ring is empty.
 inline constexpr std::uint32_t kFreeFraction = 8;
 
 // Number of slots of a ring in which `messages` messages of one slot always fit.
@@ -115,12 +115,15 @@ class RingProducer {
   }
 
  private:
-  // Lines that are claimed at once. In a stream, many: its consumer keeps a distance. Otherwise
+  static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
+  static constexpr std::uint64_t kFewClaimed = 8;
+  static constexpr std::uint64_t kManyClaimed = 32;
+  // Lines to claim at once, until the next look at the consumer. In a stream, many: its consumer keeps a distance. Otherwise
   // few: the consumer may be about to read a slot that waits for the transfers of these lines. None
   // when the consumer has taken everything: it polls the next slot and takes its line back at once.
   [[nodiscard]] std::uint64_t linesToClaim() noexcept {
     if (waiting() == 0) return 0;
-    return pushed_ - freedSeen_ < 64 ? 8 : 32;
+    return pushed_ - freedSeen_ < kFarAhead ? kFewClaimed : kManyClaimed;
   }
 
   layout::Slot& slot(std::uint64_t position) const noexcept {
@@ -210,7 +213,8 @@ class RingProducer {
   SecondRing second_;  // until we have moved there
   std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
-  std::uint64_t claim_ = 0;  // lines that are claimed at once
+  // Lines that are claimed at once. None in the first lap: the consumer has read none of them.
+  std::uint64_t claim_ = 0;
   std::uint64_t claimed_ = 0;  // slots before this position were claimed
   std::uint64_t messages_ = 0;
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken

@@ -2,6 +2,7 @@
 // ReplyCounts: no reply of any thread is lost.
 #include "server/reply_counts.h"
 
+#include <atomic>
 #include <gtest/gtest.h>
 #include <thread>
 #include <vector>
@@ -38,6 +39,18 @@ TEST_F(ReplyCountsTest, CountsTheRepliesOfTheServersThreadApartFromTheOthers) {
 
   EXPECT_EQ(valueOf(control_.sent), 2u * kReplies);
   EXPECT_EQ(valueOf(control_.sentElsewhere), 2u * kReplies * kThreads);
+}
+
+TEST_F(ReplyCountsTest, TheFirstThreadThatTakesRequestsStaysTheOnlyWriter) {
+  counts_.noteServerThread();
+  std::jthread([&] {
+    counts_.noteServerThread();
+    counts_.sent();
+  }).join();
+  counts_.sent(2);
+
+  EXPECT_EQ(valueOf(control_.sent), 2u);
+  EXPECT_EQ(valueOf(control_.sentElsewhere), 1u);
 }
 
 TEST_F(ReplyCountsTest, CountsWhatWasNotSentOnAnyThread) {

@@ -49,7 +49,7 @@ Life lifeOf(const std::string& name, const SegmentImage& image) {
 
 void copyCounters(const layout::WindowControl& from, WindowView& to) {
   to.received = value(from.received);
-  to.sent = value(from.sent);
+  to.sent = value(from.sent) + value(from.sentElsewhere);
   to.replyQueueFull = value(from.replyQueueFull);
   to.queueFull = value(from.queueFull);
   to.expired = value(from.expired);

@@ -113,6 +113,18 @@ TEST_F(SnapshotTest, AddsALinkToBothOfItsWindows) {
   EXPECT_EQ(snapshot.servers.front().sent, 2U);
 }
 
+TEST_F(SnapshotTest, CountsTheRepliesOfAllThreads) {
+  MessageServer server(backplane_, "dac");
+  server.on<Int32>([&](Int32Message&& request) {
+    std::jthread([&] { EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent); }).join();
+  });
+  Clients clients(backplane_);
+  ASSERT_EQ(clients.connect(server).send(Int32Message()), SendResult::sent);
+  while (!server.handleOne()) continue;
+
+  EXPECT_EQ(take().servers.front().sent, 1U);
+}
+
 // A cancelled request has had its fate, although the server still has to reply to it.
 TEST_F(SnapshotTest, CountsTheRequestsWithoutAReplyOrAFate) {
   MessageServer server(backplane_, "dac");
