@@ -118,9 +118,10 @@ class RingProducer {
   static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
   static constexpr std::uint64_t kFewClaimed = 8;
   static constexpr std::uint64_t kManyClaimed = 32;
-  // Lines to claim at once, until the next look at the consumer. In a stream, many: its consumer keeps a distance. Otherwise
-  // few: the consumer may be about to read a slot that waits for the transfers of these lines. None
-  // when the consumer has taken everything: it polls the next slot and takes its line back at once.
+  // Lines to claim at once, until the next look at the consumer. In a stream, many: its consumer
+  // keeps a distance. Otherwise few: the consumer may be about to read a slot that waits for the
+  // transfers of these lines. None when the consumer has taken everything: it polls the next slot
+  // and takes its line back at once.
   [[nodiscard]] std::uint64_t linesToClaim() noexcept {
     if (waiting() == 0) return 0;
     return pushed_ - freedSeen_ < kFarAhead ? kFewClaimed : kManyClaimed;
