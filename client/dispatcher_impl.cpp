@@ -102,7 +102,7 @@ bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
     // Checked even when every step finds work: a busy dispatcher must stop, too.
     if (isOver()) return false;
     if (step()) return true;
-    // The step clears the local hints, and with them that of an interrupt() since the check above.
+    // The step takes the local event, and with it that of an interrupt() since the check above.
     if (isOver()) return false;
     dropKnocks();
     const bool hasWoken = endpoint().wait(std::min(deadline, nextDue()));

@@ -16,8 +16,8 @@ class ReplyCounts {
  public:
   explicit ReplyCounts(layout::WindowControl& control) noexcept : control_(control) {}
 
-  // The calling thread takes the server's requests. The replies of the first such thread are
-  // counted without a locked instruction; it stays the only writer of this counter.
+  // Called by a thread before it takes requests. The first such thread becomes the only writer of
+  // `sent`, without a locked instruction; all others add to `sentElsewhere`.
   void noteServerThread() noexcept {
     if (serverThread_.load(std::memory_order_relaxed) != 0) return;
     std::uint64_t none = 0;

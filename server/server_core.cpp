@@ -189,7 +189,7 @@ Message ServerCore::receive() {
   return {};
 }
 
-// Also handles what need not be looked at before each request.
+// Handles control events and exceptions of client callbacks, then looks at the other links.
 MaybeIndex ServerCore::nextOther() {
   replyCounts_.noteServerThread();
   if (endpoint_.hasControlEvents()) handleControlEvents();

@@ -90,9 +90,9 @@ MaybeIndex Endpoint::nextOther() noexcept {
   return next();
 }
 
-// Takes one message of each ready link. The round ends when the index wraps around; then the polled
-// links have their turns. If as many links are polled as may be, another busy link waits for one
-// turn of each.
+// Returns the ready links, one by one. The round ends when the index wraps around; then the polled
+// links have kHintsEvery turns, or, if as many links are polled as may be, one each, so that a busy
+// link that is not polled waits no longer than that.
 MaybeIndex Endpoint::nextCold() noexcept {
   const auto from = readyBits_.position();
   const auto index = nextReady();

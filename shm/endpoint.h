@@ -6,12 +6,13 @@
 //   control events, which are not of a link: Knocks, and local events such as a death (PeerWindows)
 //
 // Idle links cost nothing, however many there are: the endpoint looks at a link that it does not
-// poll only when its ready bit is set. Links take turns, one message each.
+// poll only when its ready bit is set. Links take turns; a server takes one message in a turn, a
+// dispatcher up to 16.
 //
 // Threads  one owner thread; interrupt() may be called by any thread and by a signal handler.
 // Crash    the watcher reports a peer's death as a local event: takeLocalEvent(), takePeerDeath().
-// Trust    a ready bit may be missing or set without reason: before a sleep the endpoint looks at
-//          every link.
+// Trust    a ready bit may be missing or set without reason: the endpoint looks at every link
+//          before a sleep, or, if it has many, every 100 ms.
 #pragma once
 
 #include <atomic>
@@ -65,8 +66,9 @@ class Endpoint {
     if (const auto index = nextPolled()) return index;
     return nextOther();
   }
-  // The two halves of next(). A link that nextPolled() returns has a message. If it returns none,
-  // the caller may handle control events, and then calls nextOther().
+  // The two halves of next(). A link that nextPolled() returns has a message. It returns nothing
+  // when no polled link has one, and after kHintsEvery turns. The caller then calls nextOther(); it
+  // may handle control events before.
   MaybeIndex nextPolled() noexcept {
     if (polledLeft_ == 0) return {};
     const auto index = hot_.next();
@@ -134,7 +136,7 @@ class Endpoint {
   ReadyBits readyBits_;
   HotLinks hot_;
   Knocks knocks_;
-  // Turns of polled links before the next look at the hints; 0 also while armed.
+  // Turns of polled links before a round of the ready links; 0 in that round and while armed.
   std::uint32_t polledLeft_ = 0;
   std::uint32_t sinceScan_ = 0;  // looks at the hints since the last scan of all links
   // A link that is not polled and may have further messages after the one that was taken.

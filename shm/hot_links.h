@@ -47,8 +47,9 @@ class HotLinks {
     }
     return false;
   }
-  // Index of the next polled link that has a message; links take turns. Nothing if there is no
-  // message, or if polling of an idle link has ended.
+  // Index of the next polled link that has a message; links take turns. Nothing if it finds none.
+  // Frees the slots of a link when it finds no message there for the first time. Ends the polling
+  // of a link that is idle for long, and then returns although others may have messages.
   MaybeIndex next() noexcept {
     for (auto looks = size_; looks != 0; --looks) {
       if (++turn_ >= hot_.data() + size_) turn_ = hot_.data();

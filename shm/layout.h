@@ -157,7 +157,7 @@ struct WindowControl {
   // requests of one client that may wait, for links created from now on (server windows)
   Word32 queueSize;
   std::atomic<Shortage> shortage;  // why the server cannot accept a client now
-  Word64 progressAtNs;  // CLOCK_MONOTONIC when `received` was last sampled
+  Word64 progressAtNs;  // CLOCK_MONOTONIC at the take of the last timed request
   alignas(kPairBytes) Word64 received;  // messages taken
   Word64 sent;  // server windows: messages pushed by the first thread that took requests
   Word64 replyQueueFull;  // replies refused because the client did not take them

@@ -41,8 +41,8 @@ namespace mpf {
                                         sizeof(layout::MoreSlot::body));
 }
 
-// The consumer frees slots when it has taken kMaxBatch or 1/kFreeFraction of the ring, or when it
-// is told that the ring is empty.
+// The consumer frees slots when it has taken kMaxBatch or 1/kFreeFraction of the ring, whichever is
+// less, or when it is told that the ring is empty.
 inline constexpr std::uint32_t kFreeFraction = 8;
 
 // Number of slots of a ring in which `messages` messages of one slot always fit.
@@ -148,6 +148,7 @@ class RingProducer {
     slots_ = std::exchange(second_.slots, nullptr);
     capacity_ = usable_ = second_.capacity;
     freedSeen_ = pushed_;
+    claim_ = 0;
     // PAIR(slot-filled): a consumer that sees this sequence continues in the second ring.
     last.sequence.store(layout::kContinuesInSecondRing | (pushed_ + 1), std::memory_order_release);
     MPF_STEP(ring_moved);
@@ -156,7 +157,8 @@ class RingProducer {
   // Makes this processor the owner of the lines of the next slots, with a write to each that
   // changes nothing. The transfers of these lines from the consumer's processor overlap; those of
   // messages do not, because the stores of one message fill the store buffer. (prefetchw had no
-  // effect here: a processor did not take a line with it that it shared with another one.)
+  // effect here: a processor did not take a line with it that it shared with another one.) If
+  // claim_ is 0, the next claim comes after the slots that are known to be free.
   [[gnu::noinline]] void claimLines() noexcept {
     const auto end = freedSeen_ + capacity_;
     claimed_ = claim_ == 0 ? end : std::min(end, pushed_ + claim_);
@@ -214,9 +216,9 @@ class RingProducer {
   SecondRing second_;  // until we have moved there
   std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
-  // Lines that are claimed at once. None in the first lap: the consumer has read none of them.
+  // Lines that are claimed at once; 0: none, as in the first lap, whose lines nobody has read.
   std::uint64_t claim_ = 0;
-  std::uint64_t claimed_ = 0;  // slots before this position were claimed
+  std::uint64_t claimed_ = 0;  // the position of the next claim
   std::uint64_t messages_ = 0;
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
 };
@@ -276,7 +278,7 @@ class RingConsumer {
   }
   // The same if hasOneSlot().
   void endOneSlot() noexcept { end(1); }
-  // The owner has looked for a message and found none: frees the slots that remain.
+  // The owner has found no message: frees all slots that were taken, and begins a new batch.
   void onEmpty() noexcept {
     if (taken_ != freed_) free();
     batchEnd_ = taken_ + batch_;
