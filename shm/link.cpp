@@ -164,7 +164,7 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       outWatch_(watchOf(segment_, other(side))),
       inWatch_(watchOf(segment_, side)),
       out_(slotsOf(segment_, side), slotCount(segment_, side), ringControl(segment_, side),
-           secondRing(segment_, side)),
+           secondRing(segment_, side), &in_),
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)),
           ringControl(segment_, other(side)), secondRing(segment_, other(side))),
       pool_(poolPlace(segment_, backplane_, side), {rights.mode & 0666, rights.group, rights.user},

@@ -19,6 +19,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstring>
@@ -58,15 +59,18 @@ struct SecondRing {
   layout::Word64* moved = nullptr;  // written by the producer: 1 + its first position
 };
 
+class RingConsumer;
 class RingProducer {
  public:
+  //   incoming   the ring of the other direction, if there is one
   RingProducer(layout::Slot* slots, std::uint32_t capacity, const layout::RingControl& consumer,
-               const SecondRing& second = {}) noexcept
+               const SecondRing& second = {}, const RingConsumer* incoming = nullptr) noexcept
       : slots_(slots),
         capacity_(capacity),
         usable_(second.slots == nullptr ? capacity : capacity - 1),
         consumer_(consumer),
-        second_(second) {}
+        second_(second),
+        incoming_(incoming) {}
 
   // Pushes `body` (at most layout::kInlineBodyBytes) and returns true. If fewer than `reserve` free
   // slots would remain, changes nothing and returns false.
@@ -115,17 +119,14 @@ class RingProducer {
   }
 
  private:
-  static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
-  static constexpr std::uint64_t kFewClaimed = 8;
-  static constexpr std::uint64_t kManyClaimed = 32;
   // Lines to claim at once, until the next look at the consumer. In a stream, many: its consumer
   // keeps a distance. Otherwise few: the consumer may be about to read a slot that waits for the
-  // transfers of these lines. None when the consumer has taken everything: it polls the next slot
-  // and takes its line back at once.
-  [[nodiscard]] std::uint64_t linesToClaim() noexcept {
-    if (waiting() == 0) return 0;
-    return pushed_ - freedSeen_ < kFarAhead ? kFewClaimed : kManyClaimed;
-  }
+  // transfers of these lines. None when messages go there and back one by one: the consumer polls
+  // the next slot and takes its line back at once.
+  static constexpr std::uint64_t kFewClaimed = 8, kManyClaimed = 32;
+  static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
+  // Whether this side was idle before nearly each of the messages since the last call.
+  [[nodiscard]] bool isOneByOne() noexcept;
 
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
@@ -135,7 +136,7 @@ class RingProducer {
   [[gnu::noinline]] bool hasFreed(std::uint32_t count) noexcept {
     // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
     freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
-    claim_ = linesToClaim();
+    claim_ = isOneByOne() ? 0 : pushed_ - freedSeen_ < kFarAhead ? kFewClaimed : kManyClaimed;
     if (pushed_ + count - freedSeen_ <= usable_) return true;
     return second_.slots != nullptr && tryMove() && count <= usable_;
   }
@@ -214,11 +215,14 @@ class RingProducer {
   std::uint64_t usable_;  // slots that may hold messages
   const layout::RingControl& consumer_;
   SecondRing second_;  // until we have moved there
+  const RingConsumer* incoming_;
   std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
   // Lines that are claimed at once; 0: none, as in the first lap, whose lines nobody has read.
   std::uint64_t claim_ = 0;
   std::uint64_t claimed_ = 0;  // the position of the next claim
+  std::uint64_t judged_ = 0;  // messages at the last call of isOneByOne()
+  std::uint64_t idleSeen_ = 0;  // timesIdle() then
   std::uint64_t messages_ = 0;
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
 };
@@ -281,10 +285,16 @@ class RingConsumer {
   // The owner has found no message: frees all slots that were taken, and begins a new batch.
   void onEmpty() noexcept {
     if (taken_ != freed_) free();
+    if (std::exchange(messagesBeforeIdle_, messages_) != messages_)
+      timesIdle_.store(timesIdle() + 1, std::memory_order_relaxed);
     batchEnd_ = taken_ + batch_;
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
+  // How often onEmpty() was called after further messages. Any thread.
+  [[nodiscard]] std::uint64_t timesIdle() const noexcept {
+    return timesIdle_.load(std::memory_order_relaxed);
+  }
 
  private:
   layout::Slot& slot(std::uint64_t position) const noexcept {
@@ -376,7 +386,15 @@ class RingConsumer {
   std::uint64_t waitAt_ = 0;  // no wait for the producer before this position
   std::uint64_t waitEvery_ = batch_;
   std::uint64_t messages_ = 0;
+  std::uint64_t messagesBeforeIdle_ = 0;
+  std::atomic<std::uint64_t> timesIdle_{0};
   std::uint8_t slotsNow_ = 0;
 };
+
+inline bool RingProducer::isOneByOne() noexcept {
+  const auto idle = incoming_ != nullptr ? incoming_->timesIdle() : 0;
+  const auto sent = messages_ - std::exchange(judged_, messages_);
+  return 4 * (idle - std::exchange(idleSeen_, idle)) >= 3 * sent;
+}
 
 }  // namespace mpf

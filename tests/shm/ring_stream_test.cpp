@@ -19,6 +19,18 @@ TEST_F(RingTest, TheLastSlotsAreFreedWhenTheRingIsFoundEmpty) {
   EXPECT_EQ(control_.freed.load(std::memory_order_relaxed), 1u);
 }
 
+TEST_F(RingTest, CountsHowOftenItsOwnerWasIdleAfterMessages) {
+  consumer_.onEmpty();
+  EXPECT_EQ(consumer_.timesIdle(), 0u) << "without a message before";
+  for (const auto ordinal : {1u, 2u}) ASSERT_TRUE(push(ordinal));
+  for (int i = 0; i < 2; ++i) take();
+
+  consumer_.onEmpty();
+  consumer_.onEmpty();
+
+  EXPECT_EQ(consumer_.timesIdle(), 1u);
+}
+
 TEST_F(RingTest, AClaimOfLinesChangesNothing) {
   constexpr std::size_t kBytes = kCapacity * sizeof(layout::Slot);
   for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(push(i));
