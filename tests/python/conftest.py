@@ -22,6 +22,12 @@ PATIENCE = 120.0
 
 PROGRAMS = Path(os.environ["MPF_TEST_PROGRAMS"])
 HAS_MPF = (PROGRAMS / "mpf").exists()  # builds with a sanitizer lack it
+#: The allocator of AddressSanitizer in g++ 12 stays locked in a child if another thread of its
+#: parent used it during the fork.
+may_fork_beside_threads = pytest.mark.skipif(
+    hasattr(ctypes.CDLL(None), "__asan_init"),
+    reason="AddressSanitizer may hang after a fork beside other threads",
+)
 needs_mpf = pytest.mark.skipif(not HAS_MPF, reason="the program mpf was not built")
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import PATIENCE
+from conftest import PATIENCE, may_fork_beside_threads
 
 import mpf
 
@@ -127,6 +127,7 @@ busy.join()
 """
 
 
+@may_fork_beside_threads
 @pytest.mark.parametrize("end", ["sys.exit(value != 42)", "os._exit(value != 42)"])
 def test_a_forked_child_makes_objects_of_its_own(
     end: str, doubler: mpf.Server, backplane: str
