@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import atexit
 import contextlib
 import ctypes
 import importlib
@@ -300,6 +301,7 @@ def main() -> int:
     arguments = parser.parse_args()
     client_cpu, server_cpu = (int(cpu) for cpu in arguments.cpus.split(","))
     os.environ["MPF_BACKPLANE"] = f"bench-{os.getpid()}"
+    atexit.register(subprocess.run, [program.find(), "clean"], stdout=subprocess.DEVNULL)
     os.sched_setaffinity(0, {client_cpu})
     bench = _Bench(server_cpu)
     times: dict[str, _Times] = {}
@@ -318,7 +320,6 @@ def main() -> int:
           f"servers on CPU {server_cpu}, Python {sys.version.split()[0]}")
     _print(rows)
     print(f"replies to {_SUBSCRIPTIONS} subscriptions of one client: {replies:,.0f} a second")
-    subprocess.run([program.find(), "clean"], stdout=subprocess.DEVNULL, check=False)
     return 0
 
 
