@@ -105,13 +105,17 @@ FileDescriptor Process::openOwner(const layout::SegmentHeader& header) {
   return descriptor;
 }
 
+// A zombie (it has ended, but its parent has not waited for it) still has its pid and start time.
+bool Process::hasEnded(const FileDescriptor& process) noexcept {
+  pollfd ended{process.get(), POLLIN, 0};
+  return ::poll(&ended, 1, 0) == 1 && (ended.revents & POLLIN) != 0;
+}
+
 bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
   if (!isNamed(header)) return false;
   const auto descriptor = openProcess(header.ownerPid);
   if (!descriptor) return errno == ESRCH;
-  // A zombie (it has ended, but its parent has not waited for it) still has its pid and start time.
-  pollfd ended{descriptor.get(), POLLIN, 0};
-  if (::poll(&ended, 1, 0) == 1) return true;
+  if (hasEnded(descriptor)) return true;
   const auto ticks = startTicksOf(header.ownerPid);
   // A process that reuses the pid has a later start time. The tolerance is for emulators: qemu
   // shows its program a start time that differs from the one in /proc.

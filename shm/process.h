@@ -30,6 +30,8 @@ struct Process {
   // A descriptor that becomes readable when the owner in `header` ends. Empty if the owner has
   // ended already, is in another pid namespace, or another process has its pid now.
   static FileDescriptor openOwner(const layout::SegmentHeader& header);
+  // Whether the process of a descriptor from openOwner() has ended.
+  static bool hasEnded(const FileDescriptor& process) noexcept;
   // Whether it is proven that the owner in `header` has ended. Also false if this process cannot
   // find out: the header names no process, the process is in another pid namespace, or /proc does
   // not show it.

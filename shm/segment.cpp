@@ -215,6 +215,8 @@ std::uint32_t Segment::fileUser() const {
   return status.st_uid;
 }
 
+bool Segment::isLocked() const noexcept { return owner_lock::isHeld(file_.get()); }
+
 bool Segment::hasOwner() const noexcept { return owner_lock::isHeldByOwner(file_.get(), header_); }
 
 std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind,

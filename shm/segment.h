@@ -94,11 +94,13 @@ class Segment {
     return *reinterpret_cast<T*>(data() + offset);
   }
 
-  // The next three must be called before closeFile().
+  // The next four must be called before closeFile().
   // Number of the user that owns the file.
   [[nodiscard]] std::uint32_t fileUser() const;
   // Whether the owner is alive, as probeOwner() finds out, even if the file has lost its name.
   [[nodiscard]] bool hasOwner() const noexcept;
+  // Whether any process holds the owner's lock.
+  [[nodiscard]] bool isLocked() const noexcept;
   void setRights(const Rights& rights) const { mpf::setRights(file_.get(), rights); }
   // Closes the file and keeps the mapping. For segments without a lock.
   void closeFile() { file_.reset(); }

@@ -17,7 +17,6 @@
 #include "base/step.h"
 #include "base/system_call.h"
 #include "base/timespec.h"
-#include "shm/process.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -86,18 +85,19 @@ Watcher::~Watcher() {
 void Watcher::start() {
   if (thread_.joinable()) return;
   const SignalsBlocked blocked;
-  thread_ = std::thread([this] { run(); });
-  ::pthread_setname_np(thread_.native_handle(), "mpf-watcher");
+  thread_ = std::thread([this] {
+    ::pthread_setname_np(::pthread_self(), "mpf-watcher");
+    run();
+  });
 }
 
 Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback) {
   const std::lock_guard lock(mutex_);
   start();
   const auto token = next_++;
-  auto process = Process::openOwner(peer->header());
-  const bool isPolled = !process;
-  if (process) add(epoll_.get(), process.get(), token);
-  peers_.emplace(token, Peer{std::move(peer), std::move(callback), std::move(process)});
+  const bool isPolled = !peer->process();
+  if (!isPolled) add(epoll_.get(), peer->process().get(), token);
+  peers_.emplace(token, Peer{std::move(peer), std::move(callback), isPolled});
   updateTimer();
   if (isPolled) pollAtOnce();  // the peer may have died before it was watched
   return token;
@@ -123,10 +123,19 @@ void Watcher::openNames() {
   add(epoll_.get(), names_.get(), kNames);
 }
 
+// Others may keep the window, and with it the descriptor of its process.
+void Watcher::leaveEpoll(Peer& peer) const noexcept {
+  if (std::exchange(peer.isPolled, true)) return;
+  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, peer.window->process().get(), nullptr);
+}
+
 void Watcher::forget(Token token) {
   if (isInherited()) return;  // the epoll instance is shared with the parent
   const std::lock_guard lock(mutex_);
-  peers_.erase(token);
+  if (const auto found = peers_.find(token); found != peers_.end()) {
+    leaveEpoll(found->second);
+    peers_.erase(found);
+  }
   if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty() && names_) {
     ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, names_.get(), nullptr);
     closeElsewhere(std::move(names_));
@@ -154,11 +163,7 @@ void Watcher::handle(Token token) {
   } else if (token == kNames) {
     readNames();
   } else if (const auto found = peers_.find(token); found != peers_.end()) {
-    if (isGone(found->second)) return report(token);
-    // The process has ended, but the lock is still held: a child inherited it. The lock decides, so
-    // poll it from now on.
-    found->second.process.reset();
-    updateTimer();
+    report(token);
   }
 }
 
@@ -168,7 +173,8 @@ bool Watcher::isGone(const Peer& peer) const {
 
 void Watcher::report(Token token) {
   const auto found = peers_.find(token);
-  auto peer = std::move(found->second);
+  leaveEpoll(found->second);
+  const auto peer = std::move(found->second);
   peers_.erase(found);
   updateTimer();
   peer.window->setDead();
@@ -201,7 +207,7 @@ void Watcher::poll() {
   [[maybe_unused]] const auto got = ::read(timer_.get(), &expirations, sizeof expirations);
   std::vector<Token> gone;
   for (const auto& [token, peer] : peers_) {
-    if (!peer.process && isGone(peer)) gone.push_back(token);
+    if (peer.isPolled && isGone(peer)) gone.push_back(token);
   }
   for (const auto token : gone) {
     if (peers_.contains(token)) report(token);
@@ -218,7 +224,7 @@ void Watcher::pollAtOnce() {
 // Does not restart a running timer: frequent changes must not delay it.
 void Watcher::updateTimer() {
   bool needed = !names_ && !nameCallbacks_.empty();
-  for (const auto& [token, peer] : peers_) needed = needed || !peer.process;
+  for (const auto& [token, peer] : peers_) needed = needed || peer.isPolled;
   if (needed == polls_) return;
   polls_ = needed;
   itimerspec spec{};

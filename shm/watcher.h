@@ -2,14 +2,15 @@
 // Watcher: one thread of a process that reports the death of peers, and new servers and pending
 // binds. The thread starts at the first watch and sleeps until an event.
 //
-//   pidfd is readable ─► is the lock of the peer's window free? ─► dead: callback, once
+//   pidfd of the peer's window is readable ─► dead: callback, once
 //   new name in /dev/shm ─► callbacks for its kind (clients: servers; routers: pending binds)
 //
 // Threads  any thread may call; callbacks run on the watcher's thread and must not block.
 // Crash    if a peer has no pidfd here (another pid namespace, a reused pid), the watcher checks
 //          its lock every 100 ms. Likewise, it calls the callbacks for names every 100 ms if the
 //          user has no free inotify instance.
-// Trust    a peer's pid is only a hint; the kernel's lock is the proof.
+// Trust    the pid of a window is from a header that its owner alone writes. Without a pidfd, the
+//          kernel's lock is the proof.
 #pragma once
 
 #include <functional>
@@ -36,8 +37,8 @@ class Watcher {
   explicit Watcher(std::string backplane);
   ~Watcher();
 
-  // Calls `callback` once, after the owner of `peer` has died or closed its window. Then
-  // peer->isDead() is true.
+  // Calls `callback` once, after the owner of `peer`, which is not watched yet, has died or closed
+  // its window. Then peer->isDead() is true.
   Token watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
   // Calls `callback` each time a segment of this kind may have appeared.
   Token watchNames(NameKind kind, Callback callback);
@@ -49,10 +50,11 @@ class Watcher {
   struct Peer {
     std::shared_ptr<PeerWindow> window;
     Callback callback;
-    FileDescriptor process;  // empty: polled
+    bool isPolled = false;  // or its process is in epoll_
   };
   void start();
   void run();
+  void leaveEpoll(Peer& peer) const noexcept;
   void handle(Token token);
   bool isGone(const Peer& peer) const;
   void report(Token token);

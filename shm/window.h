@@ -107,7 +107,9 @@ class PeerWindow {
   // Whether one of its files was truncated. Its contents are then meaningless.
   [[nodiscard]] bool isLost() const noexcept { return window_.isLost() || hints_.isLost(); }
   // Asks the kernel whether the owner is alive.
-  [[nodiscard]] bool hasOwner() const noexcept { return window_.hasOwner(); }
+  [[nodiscard]] bool hasOwner() const noexcept;
+  // Becomes readable when the owner's process ends; empty if this process cannot find it.
+  [[nodiscard]] const FileDescriptor& process() const noexcept { return process_; }
   [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }
   [[nodiscard]] bool isClosed() const noexcept {
     // PAIR(window-closed): also sees that the owner has closed its links.
@@ -122,6 +124,7 @@ class PeerWindow {
   }
   Segment window_;
   Segment hints_;
+  FileDescriptor process_;
   std::string fifoName_;
   std::mutex fifoMutex_;
   FileDescriptor fifo_;  // opened when the owner first sleeps on its descriptor
