@@ -67,8 +67,11 @@ fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FU
 	cmake --build --preset fuzz --parallel $(JOBS)
 	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
+# Configured again, because mpf-bench is linked to Aeron's libraries if they are there.
 bench-peers: release ## build iceoryx2 and Aeron for `make bench` (after scripts/setup bench)
 	@scripts/bench-peers build/release/bin
+	@cmake --preset release --log-level=NOTICE
+	cmake --build --preset release --parallel $(JOBS) --target mpf-bench
 
 # Also writes the table to build/release/bench/.
 bench: release $(if $(filter-out local,$(BENCH)),,bench-peers)
