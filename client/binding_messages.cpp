@@ -69,8 +69,11 @@ void Binding::deliverRemaining(const MessageLink* ended) {
 }
 
 bool Binding::tryTakeLong(BodyFields fields, RequestMarks marks, Times times, Request* request) {
-  Message message;
-  switch (channel().tryFinishLong(fields, marks, message)) {
+  const Route route{0, marks.requestId, request != nullptr ? kEndsRequest : 0, nullptr};
+  MessageLink::Finish finish{};
+  auto message = channel().finishLong(
+      fields, {route, marks.clientType, marks.clientExtra, times.timeNs}, finish);
+  switch (finish) {
     case MessageLink::Finish::invalid:
       return false;
     case MessageLink::Finish::unavailable:
@@ -79,9 +82,6 @@ bool Binding::tryTakeLong(BodyFields fields, RequestMarks marks, Times times, Re
     case MessageLink::Finish::message:
       break;
   }
-  const auto missed = Message::missedFlags(message.getMissed());
-  message.setRoute({0, marks.requestId, missed | (request != nullptr ? kEndsRequest : 0), nullptr});
-  message.setTimeStampNs(times.timeNs);
   return tryDeliver(std::move(message), times.sentTick, request);
 }
 

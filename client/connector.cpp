@@ -87,7 +87,7 @@ bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSe
   try {
     endpoint.window().admit(Link::rightsAt(*server));  // the server writes hints into this window
     auto link = Link::create(endpoint.backplane().name(), endpoint.window(), *index, server);
-    auto channel = std::make_shared<MessageLink>(std::move(link), sender.lock());
+    auto channel = MessageLink::make(std::move(link), sender.lock());
     parts_.linkOwners.set(*index, &owner);
     sender.open(std::move(channel));
   } catch (...) {

@@ -201,12 +201,12 @@ void RequestSender::noteFull() noexcept try {
 }
 
 BodyBytes RequestSender::allocate(std::size_t bytes) {
-  std::shared_ptr<MessageLink> channel;
-  {
+  auto body = [&] {
     const BiasedLock::Guard lock(*lock_);
-    channel = channel_;
-  }
-  return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
+    return channel_ ? channel_->tryAllocateLocked(bytes) : BodyBytes{};
+  }();
+  if (body.data == nullptr) body = allocateHeapBody(bytes);
+  return body;
 }
 
 std::uint64_t RequestSender::maxMessageBytes() const noexcept {
@@ -221,14 +221,15 @@ void RequestSender::open(std::shared_ptr<MessageLink> channel) {
                                                  requests_ ? requests_->lastId() : 0);
   const BiasedLock::Guard lock(*lock_);
   requests_ = std::move(requests);
-  channel_ = std::move(channel);
+  channel_.swap(channel);
   isFullReported_ = false;
   isNudging_ = true;
 }
 
 void RequestSender::close() noexcept {
+  std::shared_ptr<MessageLink> ended;  // destroyed after the guard
   const BiasedLock::Guard lock(*lock_);
-  channel_.reset();
+  ended = std::move(channel_);
 }
 
 bool RequestSender::isTaken(const Request& request) const noexcept {

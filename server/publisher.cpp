@@ -188,6 +188,8 @@ void Publisher::collectReturned() noexcept try {
   std::vector<std::shared_ptr<MessageLink>> links;
   {
     const std::lock_guard lock(mutex_);
+    // First: the last pointer of a link must not end under the mutex.
+    links.reserve(borrowers_.size());
     for (const auto& borrower : borrowers_) {
       if (auto link = borrower.lock()) links.push_back(std::move(link));
     }

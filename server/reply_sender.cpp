@@ -126,14 +126,16 @@ void ReplySender::refuseAbandoned(const Route& route) noexcept {
   if (sendOneLocked(connection, message) == ReplyResult::sent) counts_.refused();
 }
 
+BodyBytes ReplySender::tryAllocateInPool(const Route& route, std::size_t bytes) noexcept {
+  auto& connection = Connection::of(route);
+  const BiasedLock::Guard lock(*connection.lock);
+  return connection.isOpenFor(route) ? connection.channel->tryAllocateLocked(bytes) : BodyBytes{};
+}
+
 BodyBytes ReplySender::allocate(const Route& route, std::size_t bytes) {
-  std::shared_ptr<MessageLink> channel;
-  if (route.link != 0) {
-    auto& connection = Connection::of(route);
-    const BiasedLock::Guard lock(*connection.lock);
-    if (connection.isOpenFor(route)) channel = connection.channel;
-  }
-  return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
+  auto body = route.link != 0 ? tryAllocateInPool(route, bytes) : BodyBytes{};
+  if (body.data == nullptr) body = allocateHeapBody(bytes);
+  return body;
 }
 
 }  // namespace mpf

@@ -36,6 +36,8 @@ class ReplySender {
   static BodyBytes allocate(const Route& route, std::size_t bytes);
 
  private:
+  // Without data if the client has left, or its pool has no chunk.
+  static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
   // The caller counts what was sent.

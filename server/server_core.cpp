@@ -145,8 +145,12 @@ bool ServerCore::hasRequest(Connection& connection) noexcept {
 // Returns an empty handle if the body cannot be read.
 Message ServerCore::finishLong(Connection& connection, BodyFields fields, RequestMarks marks,
                                Times times) noexcept {
-  Message message;
-  switch (connection.channel->tryFinishLong(fields, marks, message)) {
+  MessageLink::Finish finish{};
+  auto message = connection.channel->finishLong(
+      fields,
+      {connection.routeOf(marks.requestId, &keeper_), marks.clientType, marks.clientExtra, 0},
+      finish);
+  switch (finish) {
     case MessageLink::Finish::invalid:
       closeForProtocolError(connection);
       break;
@@ -155,7 +159,6 @@ Message ServerCore::finishLong(Connection& connection, BodyFields fields, Reques
       replies_.sendFate(connection, marks, Fate::refused);
       break;
     case MessageLink::Finish::message:
-      message.setRoute(connection.routeOf(marks.requestId, &keeper_));
       noteTaken(connection, marks.requestId, times, message);
       break;
   }

@@ -31,11 +31,12 @@ struct BodyFields {
   std::uint32_t bodyBytes{};
 };
 
-// The part of an envelope that a reply copies from its request.
+// The part of an envelope that a reply copies from its request. The marks of the client come first:
+// they share a register, and are stored in a message together.
 struct RequestMarks {
-  std::uint32_t requestId{};
   std::int32_t clientType{};
   std::int32_t clientExtra{};
+  std::uint32_t requestId{};
 };
 
 // The fields that are sent with a body. The ring does not interpret `type`, `clientType` or
@@ -51,7 +52,7 @@ struct Envelope {
   std::int64_t timeNs{};  // requests: the deadline; replies: the time stamp; 0: none
 
   [[nodiscard]] BodyFields body() const noexcept { return {type, flags, bodyBytes}; }
-  [[nodiscard]] RequestMarks marks() const noexcept { return {requestId, clientType, clientExtra}; }
+  [[nodiscard]] RequestMarks marks() const noexcept { return {clientType, clientExtra, requestId}; }
 };
 
 // A copy of the body bytes in a first slot, in words that the compiler keeps in registers.

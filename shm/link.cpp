@@ -230,18 +230,10 @@ void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
 }
 
-LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
+LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> body,
                            std::uint32_t waiting, std::uint32_t reserve) noexcept {
-  envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
-  // Each message that the queue may still accept needs one slot. A message of several slots may use
-  // only the slots beyond these.
-  const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
-  const auto queueLeft = waiting > queued + 1 ? waiting - queued - 1 : 0;
-  const auto needed = std::max(side_ == LinkSide::server ? maxOutstanding() : 0, queueLeft);
-  if (body.size() <= layout::kInlineBodyBytes && out_.tryPush(envelope, body, needed)) {
-    afterPush();
+  if (body.size() <= layout::kInlineBodyBytes && trySendInSlots(envelope, body, waiting))
     return LinkSend::sent;
-  }
   if (!out_.hasFree(1 + reserve)) return LinkSend::full;
 
   auto own = pool_.tryFind(body.data());
@@ -256,15 +248,39 @@ LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
   }
   if (own) pool_.lend(*own);
   MPF_STEP(chunk_lent);
-  envelope.flags |= layout::kSlotChunk;
-  const auto ref = own ? *own : *foreign;
   // hasFree() above has checked that it fits.
-  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), reserve)) return LinkSend::full;
-  afterPush();
+  if (!trySendRef(envelope, body.size(), own ? *own : *foreign, reserve)) return LinkSend::full;
   return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }
 
-LinkSend Link::trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+bool Link::trySendInSlots(const Envelope& envelope, std::span<const std::byte> body,
+                          std::uint32_t waiting) noexcept {
+  // Each message that the queue may still accept needs one slot. A message of several slots may use
+  // only the slots beyond these.
+  const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
+  const auto queueLeft = waiting > queued + 1 ? waiting - queued - 1 : 0;
+  const auto needed = std::max(side_ == LinkSide::server ? maxOutstanding() : 0, queueLeft);
+  auto sized = envelope;
+  sized.bodyBytes = static_cast<std::uint32_t>(body.size());
+  if (!out_.tryPush(sized, body, needed)) return false;
+  afterPush();
+  return true;
+}
+
+bool Link::trySendRef(const Envelope& envelope, std::size_t bodyBytes, const layout::ChunkRef& ref,
+                      std::uint32_t reserve) noexcept {
+  auto marked = envelope;
+  marked.flags |= layout::kSlotChunk;
+  // As long as a slot has room for: the ring copies such a body in words.
+  const std::array<std::uint32_t, layout::kFirstSlotBodyBytes / 4> body{ref.segment, ref.chunk,
+                                                                        ref.side, ref.missed};
+  const auto bytes = static_cast<std::uint32_t>(bodyBytes);
+  if (!out_.tryPushShort(marked, bytes, std::as_bytes(std::span(body)), reserve)) return false;
+  afterPush();
+  return true;
+}
+
+LinkSend Link::trySendFanOut(const Envelope& envelope, const std::shared_ptr<FanOutChunk>& chunk,
                              std::size_t bytes, Limits limits, std::uint32_t maxBorrowed) noexcept {
   auto& loans = pool_.loans();
   const auto id = envelope.requestId;
@@ -274,7 +290,7 @@ LinkSend Link::trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChun
   return result;
 }
 
-LinkSend Link::tryRelayFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+LinkSend Link::tryRelayFanOut(const Envelope& envelope, const std::shared_ptr<FanOutChunk>& chunk,
                               std::size_t bytes, Limits limits, std::uint32_t maxBorrowed,
                               std::uint32_t missed) noexcept {
   if (bytes > maxMessageBytes()) return LinkSend::tooLarge;
@@ -283,14 +299,9 @@ LinkSend Link::tryRelayFanOut(Envelope envelope, const std::shared_ptr<FanOutChu
   if (loans.count() >= maxBorrowed || !pool_.canLend() || !out_.hasFree(1 + limits.reserve))
     return LinkSend::full;
   if (!chunk || !loans.tryLend(chunk)) return LinkSend::noMemory;
-  envelope.bodyBytes = static_cast<std::uint32_t>(bytes);
-  envelope.flags |= layout::kSlotChunk;
-  const layout::ChunkRef ref{chunk->number(), 0, layout::kFanOutSide, missed};
   // hasFree() above has checked that it fits.
-  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve))
-    return LinkSend::full;
-  afterPush();
-  return LinkSend::sent;
+  const layout::ChunkRef ref{chunk->number(), 0, layout::kFanOutSide, missed};
+  return trySendRef(envelope, bytes, ref, limits.reserve) ? LinkSend::sent : LinkSend::full;
 }
 
 void Link::endFanOut() noexcept {
@@ -320,24 +331,24 @@ void Link::release(const std::byte* data) noexcept {
 }
 
 std::optional<Chunk> Link::tryChunk(std::uint32_t bodyBytes) {
+  std::array<std::byte, layout::kFirstSlotBodyBytes> body;
+  in_.firstBody().copyTo(body.data());
   layout::ChunkRef ref{};
-  if (in_.inlineCapacity() == 0) return std::nullopt;
-  in_.copyBody(std::as_writable_bytes(std::span(&ref, 1)));
-  auto chunk =
-      ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
-  if (!chunk || bodyBytes > chunk->capacity) return std::nullopt;
+  std::memcpy(&ref, body.data(), sizeof ref);
+  const bool isOurs = ref.side == static_cast<std::uint32_t>(side_);
+  auto chunk = isOurs ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
+  if (!chunk && !isOurs && hasPeerEnded()) {
+    borrowed_.giveBack(ref);
+    throw ChunkUnavailable();
+  }
+  if (chunk && bodyBytes > chunk->capacity) chunk.reset();
   return chunk;
 }
 
-std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
-  try {
-    auto chunk = ref.side == layout::kFanOutSide && side_ == LinkSide::client
-                     ? fanOut_.tryBorrow(ref)
-                     : borrowed_.tryBorrow(ref);
-    if (chunk || !hasPeerEnded()) return chunk;
-    // NOLINTNEXTLINE(bugprone-empty-catch): no descriptor or no memory: the chunk is unavailable
-  } catch (const std::exception&) {
-  }
+std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) try {
+  return ref.side == layout::kFanOutSide && side_ == LinkSide::client ? fanOut_.tryBorrow(ref)
+                                                                      : borrowed_.tryBorrow(ref);
+} catch (const std::exception&) {  // no descriptor or no memory
   borrowed_.giveBack(ref);
   throw ChunkUnavailable();
 }

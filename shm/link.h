@@ -81,6 +81,8 @@ class Link {
     return segment_.at<layout::LinkControl>(layout::kLinkControlOffset);
   }
   [[nodiscard]] const std::string& name() const noexcept { return segment_.name(); }
+  // Whether this process is a forked child of the one that made the link.
+  [[nodiscard]] bool isInherited() const noexcept { return forkGuard_.isInherited(); }
 
   [[nodiscard]] const std::shared_ptr<PeerWindow>& peer() const noexcept { return peer_; }
   void attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept;
@@ -131,7 +133,8 @@ class Link {
       return LinkSend::full;
     if (body.size() > layout::kFirstSlotBodyBytes)
       return trySendLong(envelope, body, limits.waiting, limits.reserve);
-    if (!out_.tryPushShort(envelope, body, limits.reserve)) return LinkSend::full;
+    const auto bytes = static_cast<std::uint32_t>(body.size());
+    if (!out_.tryPushShort(envelope, bytes, body, limits.reserve)) return LinkSend::full;
     afterPush();
     return LinkSend::sent;
   }
@@ -156,11 +159,11 @@ class Link {
   // At the server: sends a body of `bytes` bytes that lies in a chunk of the fan-out pool. Returns
   // `full` if the client holds `maxBorrowed` chunks of this pool, and `noMemory` if `chunk` is
   // null; then the message counts as missed by its request.
-  LinkSend trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+  LinkSend trySendFanOut(const Envelope& envelope, const std::shared_ptr<FanOutChunk>& chunk,
                          std::size_t bytes, Limits limits, std::uint32_t maxBorrowed) noexcept;
   // As trySendFanOut(), for a message of another server: the client is told that `missed` messages
   // of the request were dropped. Does not count a message that is not sent.
-  LinkSend tryRelayFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+  LinkSend tryRelayFanOut(const Envelope& envelope, const std::shared_ptr<FanOutChunk>& chunk,
                           std::size_t bytes, Limits limits, std::uint32_t maxBorrowed,
                           std::uint32_t missed) noexcept;
   // At the server: takes what the client has returned of both pools.
@@ -191,8 +194,8 @@ class Link {
   [[nodiscard]] bool hasEvents() noexcept {
     return in_.hasMessage() || peerState() >= layout::LinkState::closed;
   }
-  // The chunk of the kSlotChunk message begun: borrowed from the peer, or one of ours that the peer
-  // returns in a message. nullopt if the reference is invalid.
+  // The chunk of the kSlotChunk message begun, whose number of slots is valid: borrowed from the
+  // peer, or one of ours that the peer returns in a message. nullopt if the reference is invalid.
   //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
   std::optional<Chunk> tryChunk(std::uint32_t bodyBytes);
 
@@ -218,10 +221,16 @@ class Link {
   static constexpr std::uint64_t kSampleEvery = 64;
 
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
-  // For a body that does not fit into the first slot. Takes copies, so that those of trySend() stay
-  // in registers. The limits come one by one: a copy of both at once would wait for their stores.
-  LinkSend trySendLong(Envelope envelope, std::span<const std::byte> body, std::uint32_t waiting,
-                       std::uint32_t reserve) noexcept;
+  // For a body that does not fit into the first slot. The limits come one by one: a copy of both at
+  // once would wait for their stores.
+  LinkSend trySendLong(const Envelope& envelope, std::span<const std::byte> body,
+                       std::uint32_t waiting, std::uint32_t reserve) noexcept;
+  // Whether the body was sent in slots of the ring.
+  bool trySendInSlots(const Envelope& envelope, std::span<const std::byte> body,
+                      std::uint32_t waiting) noexcept;
+  // Sends a body that is in a chunk; false if the ring is full.
+  bool trySendRef(const Envelope& envelope, std::size_t bodyBytes, const layout::ChunkRef& ref,
+                  std::uint32_t reserve) noexcept;
   [[gnu::always_inline]] void afterPush() noexcept {
     if (isInBatch_) return;
     MPF_STEP(peer_checked);

@@ -84,15 +84,16 @@ class RingProducer {
     publish(first, count);
     return true;
   }
-  // As tryPush(), for a body of at most layout::kFirstSlotBodyBytes; ignores envelope.bodyBytes.
-  // Inline, so that the envelope stays in registers.
+  // As tryPush(), for a body of at most layout::kFirstSlotBodyBytes; `bodyBytes` takes the place of
+  // envelope.bodyBytes. Inline, so that the envelope stays in registers.
   [[nodiscard, gnu::always_inline]] bool tryPushShort(const Envelope& envelope,
+                                                      std::uint32_t bodyBytes,
                                                       std::span<const std::byte> body,
                                                       std::uint32_t reserve) noexcept {
     if (!hasFree(1 + reserve)) return false;
     if (pushed_ >= claimed_) claimLines();
     auto& first = slot(pushed_);
-    write(first, envelope, 1, static_cast<std::uint32_t>(body.size()));
+    write(first, envelope, 1, bodyBytes);
     if (body.size() == layout::kFirstSlotBodyBytes) [[likely]]
       detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     else if (!body.empty()) std::memcpy(first.body.data(), body.data(), body.size());
@@ -174,9 +175,8 @@ class RingProducer {
   static void write(layout::Slot& first, const Envelope& envelope, std::uint32_t slots,
                     std::uint32_t bodyBytes) noexcept {
     using detail::joined;
-    const auto put = [&](std::size_t offset, std::uint64_t word) {
-      std::memcpy(reinterpret_cast<std::byte*>(&first) + offset, &word, sizeof word);
-    };
+    auto* const slot = reinterpret_cast<std::byte*>(&first);
+    const auto put = [&](auto at, std::uint64_t word) { std::memcpy(slot + at, &word, 8); };
     static_assert(offsetof(layout::Slot, type) == 8 && offsetof(layout::Slot, slots) == 10 &&
                   offsetof(layout::Slot, flags) == 11 && offsetof(layout::Slot, bodyBytes) == 12 &&
                   offsetof(layout::Slot, clientType) == offsetof(layout::Slot, requestId) + 4 &&

@@ -166,14 +166,21 @@ class Message {
     return std::min(missed, UINT32_MAX >> kMissedShift) << kMissedShift;
   }
 
+  // What a transport knows of a message besides its type and body.
+  struct Attributes {
+    Route route;
+    std::int32_t clientType;
+    std::int32_t clientExtra;
+    std::int64_t timeStampNs;
+  };
   // Becomes the owner of a body and checks it: isSound() is the result. The lender gets the body
   // back when the handle is destroyed or reset, also when the body is invalid.
   //   body  invalid unless it has all fields and elements of the type and is aligned to 8 bytes.
   //         Without a lender, its memory must outlive the handle.
-  [[nodiscard]] static Message adopt(MessageType type, BodyBytes body) noexcept {
+  [[nodiscard]] static Message adopt(MessageType type, BodyBytes body,
+                                     const Attributes& attributes = {}) noexcept {
     Message message;
-    message.state_.type = type;
-    message.state_.inlineSize = kOutside;
+    message.setAll(type, kOutside, attributes);
     message.state_.at.body = body;
     message.check();
     return message;
@@ -187,19 +194,11 @@ class Message {
   [[nodiscard]] static Message copyInline(MessageType type,
                                           std::span<const std::byte> bytes) noexcept {
     Message message;
-    message.state_.type = type;
-    message.state_.inlineSize = static_cast<std::uint8_t>(std::min(bytes.size(), kInlineBytes));
-    if (!bytes.empty()) std::memcpy(message.data(), bytes.data(), message.state_.inlineSize);
-    message.checkInline();
+    const auto size = std::min(bytes.size(), kInlineBytes);
+    message.assignInline(type, size, {},
+                         [&](auto to) { std::copy_n(bytes.data(), size, to.data()); });
     return message;
   }
-  // What a transport knows of a message besides its type and body.
-  struct Attributes {
-    Route route{};
-    std::int32_t clientType = 0;
-    std::int32_t clientExtra = 0;
-    std::int64_t timeStampNs = 0;
-  };
   // Resets this handle and makes it a message with these attributes: `fill` receives a span of its
   // kInlineBytes bytes and writes the first `size` of them, then the body is checked: isSound() is
   // the result. `fill` must not throw. `size` must be at most kInlineBytes, which is not checked.
@@ -207,12 +206,7 @@ class Message {
   void assignInline(MessageType type, std::size_t size, const Attributes& attributes,
                     Fill&& fill) noexcept {
     reset();
-    state_.type = type;
-    state_.inlineSize = static_cast<std::uint8_t>(size);
-    state_.route = attributes.route;
-    state_.clientType = attributes.clientType;
-    state_.clientExtra = attributes.clientExtra;
-    state_.timeStampNs = attributes.timeStampNs;
+    setAll(type, static_cast<std::uint8_t>(size), attributes);
     fill(std::span<std::byte, kInlineBytes>(state_.at.inside));
     checkInline();
   }
@@ -343,6 +337,14 @@ class Message {
     }
   };
 
+  void setAll(MessageType type, std::uint8_t inlineSize, const Attributes& attributes) noexcept {
+    state_.type = type;
+    state_.inlineSize = inlineSize;
+    state_.route = attributes.route;
+    state_.clientType = attributes.clientType;
+    state_.clientExtra = attributes.clientExtra;
+    state_.timeStampNs = attributes.timeStampNs;
+  }
   // Sets `sound`, and `length` of a valid array.
   void check() noexcept {
     if (!state_.isOutside()) return checkInline();
@@ -365,7 +367,7 @@ class Message {
     checkLength(layout, length);
   }
   void checkLength(const BodyLayout& layout, std::uint32_t length) noexcept {
-    state_.sound = length <= (size() - layout.headerBytes) / layout.elementBytes;
+    state_.sound = std::uint64_t{length} * layout.elementBytes <= size() - layout.headerBytes;
     if (state_.sound) state_.length = length;
   }
   // Makes the handle empty: neither the body nor the request is given back.

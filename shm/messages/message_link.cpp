@@ -5,6 +5,23 @@
 
 namespace mpf {
 
+std::shared_ptr<MessageLink> MessageLink::make(std::unique_ptr<Link> link,
+                                               std::shared_ptr<BiasedLock> lock) {
+  return {new MessageLink(std::move(link), std::move(lock)), [](auto* one) { one->leave(); }};
+}
+
+void MessageLink::leave() noexcept {
+  // In a forked child, a thread that does not exist there may hold the lock for ever.
+  if (!link_->isInherited()) {
+    const BiasedLock::Guard guard(*lock_);
+    isOwned_ = false;
+    if (lent_ != 0) return;
+  } else if (lent_ != 0) {
+    return;
+  }
+  delete this;
+}
+
 // tryBegin() itself accepts a short body with a type in one slot.
 bool MessageLink::isValidLong(BodyFields body) const noexcept {
   if (isShort(body) || !hasType(body)) return false;
@@ -13,54 +30,58 @@ bool MessageLink::isValidLong(BodyFields body) const noexcept {
   return room != 0 && body.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room);
 }
 
-MessageLink::Finish MessageLink::tryFinishLong(BodyFields fields, RequestMarks marks,
-                                               Message& message) noexcept {
-  const auto finish = readBody(fields, message);
+Message MessageLink::finishLong(BodyFields fields, const Message::Attributes& attributes,
+                                Finish& finish) noexcept {
+  auto message = readBody(fields, attributes, finish);
   link_->incoming().end();
-  if (!message) return finish == Finish::message ? Finish::invalid : finish;
-  message.setClientType(marks.clientType);
-  message.setClientExtra(marks.clientExtra);
-  return finish;
+  return message;
 }
 
-MessageLink::Finish MessageLink::readBody(BodyFields fields, Message& message) noexcept try {
+Message MessageLink::readBody(BodyFields fields, const Message::Attributes& attributes,
+                              Finish& finish) noexcept try {
   const auto type = static_cast<MessageType>(fields.type);
-  message.reset();
-  if ((fields.flags & layout::kSlotChunk) != 0) {
-    message = readChunk(fields);
-  } else if (fields.bodyBytes <= Message::kInlineBytes) {
-    message.assignInline(type, fields.bodyBytes, {}, [&](auto body) {
+  finish = Finish::message;
+  if ((fields.flags & layout::kSlotChunk) != 0) return readChunk(fields, attributes, finish);
+  if (fields.bodyBytes <= Message::kInlineBytes) {
+    Message message;
+    message.assignInline(type, fields.bodyBytes, attributes, [&](auto body) {
       link_->incoming().copyBody(body.first(fields.bodyBytes));
     });
-  } else {
-    auto body = allocateHeapBody(layout::kInlineBodyBytes);
-    body.size = fields.bodyBytes;
-    link_->incoming().copyBody({body.data, body.size});
-    message = Message::adopt(type, body);
+    return message;
   }
-  return Finish::message;
+  auto body = allocateHeapBody(layout::kInlineBodyBytes);
+  body.size = fields.bodyBytes;
+  link_->incoming().copyBody({body.data, body.size});
+  return Message::adopt(type, body, attributes);
 } catch (const ChunkUnavailable&) {
-  return Finish::unavailable;
+  finish = Finish::unavailable;
+  return {};
 } catch (const std::bad_alloc&) {
-  return Finish::unavailable;
+  finish = Finish::unavailable;
+  return {};
 }
 
-Message MessageLink::readChunk(BodyFields fields) {
-  std::optional<Chunk> chunk;
-  {
+Message MessageLink::readChunk(BodyFields fields, const Message::Attributes& attributes,
+                               Finish& finish) {
+  const auto chunk = [&] {
     const BiasedLock::Guard guard(*lock_);
-    chunk = link_->tryChunk(fields.bodyBytes);
-    if (!chunk) return {};
-    lendOne();
+    auto one = link_->tryChunk(fields.bodyBytes);
+    if (one) ++lent_;
+    return one;
+  }();
+  if (!chunk) {
+    finish = Finish::invalid;
+    return {};
   }
-  const bool isFanOut = chunk->ref.side == layout::kFanOutSide;
+  const auto type = static_cast<MessageType>(fields.type);
+  const BodyBytes body{chunk->data, fields.bodyBytes, chunk->capacity, this};
+  if (chunk->ref.side != layout::kFanOutSide) return Message::adopt(type, body, attributes);
   // The program may have written to the last message in this mapping. Without the lock, because
   // this takes longer than anything else.
-  if (isFanOut) private_pages::drop(chunk->data, chunk->capacity);
-  auto message = Message::adopt(static_cast<MessageType>(fields.type),
-                                {chunk->data, fields.bodyBytes, chunk->capacity, this});
-  if (isFanOut) message.setRoute({0, 0, Message::missedFlags(chunk->ref.missed), nullptr});
-  return message;
+  private_pages::drop(chunk->data, chunk->capacity);
+  auto shared = attributes;
+  shared.route.flags |= Message::missedFlags(chunk->ref.missed);
+  return Message::adopt(type, body, shared);
 }
 
 void MessageLink::discard(BodyFields body) noexcept {
@@ -75,51 +96,39 @@ void MessageLink::discard(BodyFields body) noexcept {
   link_->incoming().end();
 }
 
-LinkSend MessageLink::trySendLongLocked(Envelope envelope, Message& message,
+LinkSend MessageLink::trySendLongLocked(const Envelope& envelope, Message& message,
                                         Link::Limits limits) noexcept {
   const bool ours = message.lender() == this;
   const auto result = link_->trySend(envelope, message.body(), limits);
   if (result == LinkSend::sentInPlace) {
     static_cast<void>(message.releaseBody());
-    if (ours) endLending();
+    if (ours) --lent_;
   } else if (result == LinkSend::sent && ours) {
     // The body was copied into the ring, so the chunk is free. Released here, because takeBack()
     // would lock the lock that the caller holds already.
     const auto body = message.releaseBody();
     link_->release(body.data);
-    endLending();
+    --lent_;
   }
   return result;
 }
 
-BodyBytes MessageLink::allocate(std::size_t bytes) {
-  {
-    const BiasedLock::Guard guard(*lock_);
-    if (bytes > layout::kInlineBodyBytes) {
-      if (const auto chunk = link_->tryAlloc(bytes)) {
-        lendOne();
-        return {chunk->data, bytes, chunk->capacity, this};
-      }
-    }
-  }
-  return allocateHeapBody(bytes);
+BodyBytes MessageLink::tryAllocateLocked(std::size_t bytes) noexcept {
+  if (bytes <= layout::kInlineBodyBytes) return {};
+  const auto chunk = link_->tryAlloc(bytes);
+  if (!chunk) return {};
+  ++lent_;
+  return BodyBytes{chunk->data, bytes, chunk->capacity, this};
 }
 
 void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {
-  std::shared_ptr<MessageLink> last;  // destroyed after the guard; may destroy this object
-  const auto lock = lock_;
-  const BiasedLock::Guard guard(*lock);
-  link_->release(data);
-  if (lent_ == 1) last = self_;
-  endLending();
-}
-
-void MessageLink::lendOne() noexcept {
-  if (lent_++ == 0) self_ = shared_from_this();
-}
-
-void MessageLink::endLending() noexcept {
-  if (--lent_ == 0) self_.reset();
+  if (link_->isInherited()) return;  // the parent returns its body itself
+  {
+    const BiasedLock::Guard guard(*lock_);
+    link_->release(data);
+    if (--lent_ != 0 || isOwned_) return;
+  }
+  delete this;
 }
 
 }  // namespace mpf

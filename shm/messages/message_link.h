@@ -5,6 +5,7 @@
 // Threads  one thread takes messages. Sending, allocation and the return of bodies: any thread,
 //          under the lock that the owner provides.
 // Crash    a body stays readable as long as its handle exists, even if the peer has ended.
+// Lifetime until the last pointer from make() is gone and the last body has returned.
 // Trust    a body that does not fit its envelope is invalid data; the owner then closes the link.
 #pragma once
 
@@ -19,10 +20,11 @@
 
 namespace mpf {
 
-class MessageLink final : public BodyLender, public std::enable_shared_from_this<MessageLink> {
+class MessageLink final : public BodyLender {
  public:
-  MessageLink(std::unique_ptr<Link> link, std::shared_ptr<BiasedLock> lock)
-      : link_(std::move(link)), lock_(std::move(lock)) {}
+  // The last pointer must not be destroyed under the lock.
+  static std::shared_ptr<MessageLink> make(std::unique_ptr<Link> link,
+                                           std::shared_ptr<BiasedLock> lock);
 
   [[nodiscard]] Link& link() noexcept { return *link_; }
   [[nodiscard]] BiasedLock& lock() noexcept { return *lock_; }
@@ -56,10 +58,11 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   // `invalid`: the body is invalid. `unavailable`: the body cannot be mapped, because its owner
   // has ended or memory is short; the message is lost, but the link is sound.
   enum class Finish { message, invalid, unavailable };
-  // Moves any other body of the message begun into `message`, and frees the slots. `message` is
-  // empty unless the result is `message`.
-  [[nodiscard]] Finish tryFinishLong(BodyFields fields, RequestMarks marks,
-                                     Message& message) noexcept;
+  // Returns the message begun, whose body is not isShort(), and frees its slots. The handle is
+  // empty unless `finish` becomes `message`. Adds what the server has dropped to the flags of the
+  // route.
+  [[nodiscard]] Message finishLong(BodyFields fields, const Message::Attributes& attributes,
+                                   Finish& finish) noexcept;
   // Ends the message begun without reading its body; returns its chunk, if it has one.
   void discard(BodyFields body) noexcept;
 
@@ -69,35 +72,41 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   // Inline, so that the envelope stays in registers.
   [[gnu::always_inline]] LinkSend trySendLocked(const Envelope& envelope, Message& message,
                                                 Link::Limits limits) noexcept {
-    if (!message.isInline() || message.body().size() > layout::kFirstSlotBodyBytes)
-      return trySendLongLocked(envelope, message, limits);
+    if (!message.isInline() || message.body().size() > layout::kFirstSlotBodyBytes) {
+      const Envelope copy = envelope;
+      return trySendLongLocked(copy, message, limits);
+    }
     return link_->trySend(envelope, message.body(), limits);
   }
 
-  // Allocates a body in the pool of this link, or on the heap if the body is short or the pool has
-  // no chunk for it.
-  //   throws  std::bad_alloc
-  BodyBytes allocate(std::size_t bytes);
+  // Allocates a body in the pool of this link; without data if the body is short or the pool has no
+  // chunk for it. The caller holds lock().
+  [[nodiscard]] BodyBytes tryAllocateLocked(std::size_t bytes) noexcept;
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
+  MessageLink(std::unique_ptr<Link> link, std::shared_ptr<BiasedLock> lock)
+      : link_(std::move(link)), lock_(std::move(lock)) {}
+  ~MessageLink() = default;
+  // The end of the last pointer.
+  void leave() noexcept;
   [[nodiscard]] static bool hasType(BodyFields body) noexcept {
     return body.type != static_cast<std::uint16_t>(MessageType::none);
   }
   [[nodiscard]] bool isValidLong(BodyFields body) const noexcept;
-  Finish readBody(BodyFields fields, Message& message) noexcept;
-  // For a body in a chunk; an empty handle if there is no such chunk.
+  Message readBody(BodyFields fields, const Message::Attributes& attributes,
+                   Finish& finish) noexcept;
+  // For a body in a chunk.
   //   throws  ChunkUnavailable
-  Message readChunk(BodyFields fields);
+  Message readChunk(BodyFields fields, const Message::Attributes& attributes, Finish& finish);
   // For a message that does not fit into one slot.
-  LinkSend trySendLongLocked(Envelope envelope, Message& message, Link::Limits limits) noexcept;
-  void lendOne() noexcept;
-  void endLending() noexcept;
+  LinkSend trySendLongLocked(const Envelope& envelope, Message& message,
+                             Link::Limits limits) noexcept;
 
   std::unique_ptr<Link> link_;
   std::shared_ptr<BiasedLock> lock_;
   std::uint32_t lent_ = 0;  // bodies that have not been returned; under lock_
-  std::shared_ptr<MessageLink> self_;  // set while lent_ is not 0; under lock_
+  bool isOwned_ = true;  // a pointer from make() exists; under lock_
 };
 
 }  // namespace mpf

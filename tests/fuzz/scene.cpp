@@ -19,7 +19,7 @@ void describeServer(layout::SegmentHeader& header) {
 }
 
 std::shared_ptr<MessageLink> channel(std::unique_ptr<Link> link) {
-  return std::make_shared<MessageLink>(std::move(link), std::make_shared<BiasedLock>());
+  return MessageLink::make(std::move(link), std::make_shared<BiasedLock>());
 }
 
 }  // namespace

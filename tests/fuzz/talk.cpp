@@ -25,8 +25,13 @@ std::span<const std::byte> behind(Link& link) {
 }  // namespace
 
 LinkSend sendArray(MessageLink& link, std::uint32_t requestId, std::size_t bytes) {
+  const auto size = Char8ArrayMessage::bytesFor(bytes);
+  const auto body = [&] {
+    const BiasedLock::Guard lock(link.lock());
+    return link.tryAllocateLocked(size);
+  }();
   Message message =
-      Char8ArrayMessage::inBuffer(link.allocate(Char8ArrayMessage::bytesFor(bytes)), bytes);
+      Char8ArrayMessage::inBuffer(body.data != nullptr ? body : allocateHeapBody(size), bytes);
   Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()), .requestId = requestId};
   const BiasedLock::Guard lock(link.lock());
   return link.trySendLocked(envelope, message, {});
@@ -41,7 +46,7 @@ void lookAt(const Message& message) {
 }
 
 Talk::Talk(std::unique_ptr<Link> link, FanOutPool* fanOut)
-    : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<BiasedLock>())),
+    : channel_(MessageLink::make(std::move(link), std::make_shared<BiasedLock>())),
       fanOut_(fanOut) {
   [[maybe_unused]] const auto unused = behind(channel_->link());
   ASAN_POISON_MEMORY_REGION(unused.data(), unused.size());
@@ -70,8 +75,9 @@ void Talk::turn(std::uint64_t value) {
 
 bool Talk::tryFinish(const Envelope& envelope, Message& message) {
   if (!MessageLink::isShort(envelope.body())) {
-    return channel_->tryFinishLong(envelope.body(), envelope.marks(), message) ==
-           MessageLink::Finish::message;
+    MessageLink::Finish finish{};
+    message = channel_->finishLong(envelope.body(), {}, finish);
+    return finish == MessageLink::Finish::message;
   }
   message = channel_->finishShort(envelope, {}, 0);
   return true;

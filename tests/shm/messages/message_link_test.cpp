@@ -2,6 +2,9 @@
 // MessageLink: messages of each size cross a link, and each body returns to its owner once.
 #include "shm/messages/message_link.h"
 
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <memory>
@@ -9,6 +12,7 @@
 
 #include <mpf/message_of.h>
 
+#include "shm/segment.h"
 #include "tests/shm/endpoint_pair.h"
 #include "tests/shm/shm_fixture.h"
 
@@ -24,16 +28,21 @@ class MessageLinkTest : public ShmTest {
   }
   static std::shared_ptr<MessageLink> makeLink(End& end, std::uint32_t index) {
     end.endpoint.detach(index);
-    return std::make_shared<MessageLink>(std::move(end.links[index]),
-                                         std::make_shared<BiasedLock>());
+    return MessageLink::make(std::move(end.links[index]), std::make_shared<BiasedLock>());
   }
   // An array whose elements are their indices, in the memory that the client's link chooses.
   Int32ArrayMessage allocate(std::size_t n) {
+    const auto bytes = Int32ArrayMessage::bytesFor(n);
+    auto body = tryAllocate(bytes);
     auto message =
-        Int32ArrayMessage::inBuffer(client_->allocate(Int32ArrayMessage::bytesFor(n)), n);
+        Int32ArrayMessage::inBuffer(body.data != nullptr ? body : allocateHeapBody(bytes), n);
     std::int32_t next = 0;
     for (auto& element : message.value()) element = next++;
     return message;
+  }
+  BodyBytes tryAllocate(std::size_t bytes) {
+    const BiasedLock::Guard guard(client_->lock());
+    return client_->tryAllocateLocked(bytes);
   }
   LinkSend send(Message& message) {
     Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()),
@@ -46,9 +55,9 @@ class MessageLinkTest : public ShmTest {
     Envelope envelope;
     EXPECT_TRUE(server_->hasMessage() && server_->tryBegin(envelope));
     if (MessageLink::isShort(envelope.body())) return server_->finishShort(envelope, {}, 0);
-    Message message;
-    finish_ = server_->tryFinishLong(envelope.body(), envelope.marks(), message);
-    return message;
+    const auto marks = envelope.marks();
+    return server_->finishLong(envelope.body(), {{}, marks.clientType, marks.clientExtra, 0},
+                               finish_);
   }
   // The slot of the first request.
   layout::Slot& firstSlot() {
@@ -98,22 +107,39 @@ TEST_F(MessageLinkTest, AMessageThatIsRefusedStaysWithItsOwner) {
   EXPECT_FALSE(server_->hasMessage());
 }
 
-TEST_F(MessageLinkTest, AShortBodyIsOnTheHeap) {
-  const auto body = client_->allocate(layout::kInlineBodyBytes);
-
-  EXPECT_EQ(body.lender, &heapLender());
-  heapLender().takeBack(body.data, body.capacity);
+TEST_F(MessageLinkTest, AShortBodyHasNoChunk) {
+  EXPECT_EQ(tryAllocate(layout::kInlineBodyBytes).data, nullptr);
 }
 
 TEST_F(MessageLinkTest, ALinkStaysUntilItsLastBodyReturns) {
   std::optional<Int32ArrayMessage> message(allocate(10'000));
-  const std::weak_ptr<MessageLink> link = client_;
+  const auto link = client_->link().name();
 
   client_.reset();
-  EXPECT_FALSE(link.expired());
+  EXPECT_TRUE(segments::exists(link));
+  EXPECT_EQ(message->value().back(), 9'999);
   message.reset();
 
-  EXPECT_TRUE(link.expired());
+  EXPECT_FALSE(segments::exists(link));
+}
+
+TEST_F(MessageLinkTest, AForkedChildReturnsNoBody) {
+  Message message = allocate(10'000);
+  ASSERT_EQ(send(message), LinkSend::sentInPlace);
+  auto received = take();
+  ASSERT_EQ(received.lender(), server_.get());
+
+  const auto child = ::fork();
+  if (child == 0) {
+    received.reset();
+    ::_exit(0);
+  }
+  ::waitpid(child, nullptr, 0);
+
+  const auto& returns = server_->link().control().requestChunks;
+  EXPECT_EQ(returns.returned.load(std::memory_order_relaxed), 0u);
+  received.reset();
+  EXPECT_EQ(returns.returned.load(std::memory_order_relaxed), 1u);
 }
 
 TEST_F(MessageLinkTest, ADiscardedMessageReturnsItsChunk) {
