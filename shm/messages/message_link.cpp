@@ -122,7 +122,7 @@ BodyBytes MessageLink::tryAllocateLocked(std::size_t bytes) noexcept {
 }
 
 void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {
-  if (link_->isInherited()) return;  // the parent returns its body itself
+  if (link_->isInherited()) return;  // as in leave()
   {
     const BiasedLock::Guard guard(*lock_);
     link_->release(data);
