@@ -62,7 +62,7 @@ SendResult RequestSender::tryAllowMore() noexcept {
     return SendResult::notConnected;
   auto& link = channel_->link();
   // First: values that were computed before a call would have to be saved on the stack.
-  const auto sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
+  const auto sentNs = link.timeOfNext();
   auto id = requestId;
   Request* request = nullptr;
   while ((request = requests_->tryReserve(id)) == nullptr) {
@@ -73,7 +73,7 @@ SendResult RequestSender::tryAllowMore() noexcept {
       .requestId = id,
       .clientType = message.getClientType(),
       .clientExtra = message.getClientExtra(),
-      .sentTick = sentNs != 0 ? Tick::of(sentNs) : 0,
+      .sentTick = Tick::ofSample(sentNs),
       .timeNs = deadlineNs,
   };
   request->clientType = envelope.clientType;

@@ -152,7 +152,7 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   envelope.clientExtra = request.getClientExtra();
   envelope.timeNs = message.getTimeStampNs();
   if (stamps_ && envelope.timeNs == 0) envelope.timeNs = Clock::wallNs();
-  if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
+  envelope.sentTick = Tick::ofSample(link.timeOfNext());
 
   const Link::Limits limits{0, first ? 0 : link.maxOutstanding()};
   const auto bytes = message.body().size();

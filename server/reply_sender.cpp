@@ -71,7 +71,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
                                                                   Message& message) noexcept {
   auto& link = connection.channel->link();
   // First: values that were computed before a call would have to be saved on the stack.
-  const auto sentTick = link.shouldSampleTime() ? Tick::of(Clock::nowNs()) : 0;
+  const auto sentNs = link.timeOfNext();
   const auto requestId = message.route().requestId;
   const bool isFirst = connection.owes(requestId);
   const auto timeNs = message.getTimeStampNs();
@@ -81,7 +81,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
       .requestId = requestId,
       .clientType = message.getClientType(),
       .clientExtra = message.getClientExtra(),
-      .sentTick = sentTick,
+      .sentTick = Tick::ofSample(sentNs),
       .timeNs = stamps_ && timeNs == 0 ? Clock::wallNs() : timeNs,
   };
   const auto reserve = isFirst ? 0 : link.maxOutstanding();

@@ -19,6 +19,10 @@ struct Tick {
   [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept {
     return static_cast<std::uint32_t>(ns >> 4) | 1u;
   }
+  // Of a time or 0: 0 for 0.
+  [[nodiscard]] static std::uint32_t ofSample(std::int64_t ns) noexcept {
+    return ns != 0 ? of(ns) : 0;
+  }
   [[nodiscard]] static std::int64_t nsSince(std::uint32_t tick, std::int64_t nowNs) noexcept {
     return static_cast<std::int64_t>(of(nowNs) - tick) * 16;
   }

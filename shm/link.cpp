@@ -318,6 +318,12 @@ void Link::afterFencedPush() noexcept {
   if (outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched) notifyPeer();
 }
 
+std::int64_t Link::takeSample() noexcept {
+  const auto nowNs = Clock::nowNs();
+  sampler_.note(out_.messages(), nowNs);
+  return nowNs;
+}
+
 std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept { return pool_.tryAlloc(bytes); }
 
 void Link::release(const std::byte* data) noexcept {

@@ -26,6 +26,7 @@
 #include "shm/fan_out_pool.h"
 #include "shm/pool.h"
 #include "shm/ring.h"
+#include "shm/time_sampler.h"
 #include "shm/window.h"
 
 namespace mpf {
@@ -172,10 +173,13 @@ class Link {
   void endFanOut() noexcept;
   // At the server: the number of chunks of the fan-out pool that the client holds.
   [[nodiscard]] std::uint32_t borrowedFanOut() noexcept { return pool_.loans().count(); }
-  // Whether the caller must set the time of the next message (Envelope::sentTick).
-  [[nodiscard]] bool shouldSampleTime() const noexcept {
-    return outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched ||
-           out_.messages() % kSampleEvery == 0;
+  // The time if the next message is to be timed (Envelope::sentTick), or 0.
+  [[nodiscard]] std::int64_t timeOfNext() noexcept {
+    const auto sent = out_.messages();
+    const bool isDue = outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched
+                           ? sampler_.isDue(sent)
+                           : sent % TimeSampler::kMaxInterval == 0;
+    return isDue ? takeSample() : 0;
   }
   // The ring that trySend() fills; it counts the messages that were sent, and those that the peer
   // has taken.
@@ -216,10 +220,6 @@ class Link {
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept { return maxMessageBytes_; }
 
  private:
-  // Of the messages to a peer that polls, one in kSampleEvery is timed, because reading the clock
-  // costs a quarter of a round trip. All messages to a peer that does not poll are timed.
-  static constexpr std::uint64_t kSampleEvery = 64;
-
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
   // For a body that does not fit into the first slot. The limits come one by one: a copy of both at
   // once would wait for their stores.
@@ -239,6 +239,7 @@ class Link {
       afterFencedPush();
   }
   void afterFencedPush() noexcept;
+  std::int64_t takeSample() noexcept;
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
 
   ForkGuard forkGuard_;
@@ -254,6 +255,7 @@ class Link {
   bool isUnfenced_ = false;  // the peer may send without a fence
   bool isInBatch_ = false;  // the end of the batch notifies the peer
   RingProducer out_;
+  TimeSampler sampler_;  // of outgoing messages
   RingConsumer in_;
   PoolOwner pool_;
   bool leavesPool_ = false;
