@@ -63,7 +63,7 @@ Measurement localRow(const Place& place, const std::string& question, const std:
   row.bytes = kInt32;
   const auto backplane = place.runName + "-local";
   row.run = [=, mode = place.wait](const Stage& stage) {
-    const MpfPlaces places{backplane, backplane, 0, 1024};
+    const MpfPlaces places{backplane, backplane};
     const std::shared_ptr<Peer> peer =
         makeMpfPeer<Float64Array>({mode, kInt32, false, backplane}, places);
     auto outcome = goThereAndBack(stage, peer, traffic, Meter::kNobody);
@@ -79,8 +79,7 @@ Measurement remoteRow(const Place& place, const std::string& question, const std
   auto row = rowAt(place, question, "MPF remote, " + name, true);
   row.bytes = bytes;
   row.run = [=, mode = place.wait, routers = place.routers](const Stage& stage) {
-    const MpfPlaces places{routers->serverBackplane(), routers->clientBackplane(), kRemoteLocation,
-                           1024};
+    const MpfPlaces places{routers->serverBackplane(), routers->clientBackplane(), kRemoteLocation};
     const std::shared_ptr<Peer> peer = makeMpfPeer<Array>({mode, bytes, false, {}}, places);
     return routers->run([&] { return goThereAndBack(stage, peer, traffic, routers->clientPid()); });
   };
