@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// TimeSampler: chooses which messages to a peer that does not poll get a time stamp: all of them, or
-// of fast traffic one in 2 to 64, because the clock may cost as much as the rest of a message. The
-// rate of the last few milliseconds decides, and the distance between samples varies: so a burst is
+// TimeSampler: chooses which messages to a peer that does not poll get a time stamp: all of them,
+// or of fast traffic one in 2 to 64, because reading the clock costs as much as a message. The rate
+// of the last few milliseconds decides. The distance between samples varies, so that a burst is
 // sampled evenly, from its first message, which wakes the peer, to its last.
 //
 // Threads  one at a time.
