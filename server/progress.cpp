@@ -54,11 +54,12 @@ void Progress::end() noexcept {
   if (std::exchange(isHandling_, false)) control_.handling.store(0, std::memory_order_relaxed);
 }
 
-// A fast server reads the clock for the requests that are timed, at least one in 96, a slow server
-// for each request: the stored time is at most 96 * kSlowNs too early.
+// A fast server reads the clock for the requests that are timed, at least one in 96, and for the
+// first one after a sleep, a slow server for each request. So the stored time is at most
+// 96 * kSlowNs too early while requests follow one another.
 void Progress::note(std::int64_t nowNs) noexcept {
   const auto taken = control_.received.load(std::memory_order_relaxed);
-  isSlow_ = nowNs - notedAtNs_ > kSlowNs * static_cast<std::int64_t>(taken - notedTaken_);
+  isDue_ = nowNs - notedAtNs_ > kSlowNs * static_cast<std::int64_t>(taken - notedTaken_);
   notedAtNs_ = nowNs;
   notedTaken_ = taken;
   control_.progressAtNs.store(static_cast<std::uint64_t>(nowNs), std::memory_order_relaxed);

@@ -22,13 +22,16 @@ class Progress {
   void end() noexcept;
   // Stores the time of the request that was taken last.
   void note(std::int64_t nowNs) noexcept;
-  // Whether requests take so long that reading the clock for each of them costs little.
-  [[nodiscard]] bool isSlow() const noexcept { return isSlow_; }
+  // The server has slept.
+  void noteSleep() noexcept { isDue_ = true; }
+  // Whether to note the time of the next request, even if it is not timed: requests take so long
+  // that reading the clock for each of them costs little, or the server has slept before.
+  [[nodiscard]] bool isDue() const noexcept { return isDue_; }
 
  private:
   layout::WindowControl& control_;
   bool isHandling_ = false;  // the window shows a request
-  bool isSlow_ = false;
+  bool isDue_ = false;
   std::int64_t notedAtNs_ = 0;  // the last time that was stored
   std::uint64_t notedTaken_ = 0;  // number of requests taken until then
 };

@@ -76,7 +76,10 @@ bool ServerCore::wait(Deadline deadline) {
     return stop_.load(std::memory_order_relaxed) &&
            stop_.exchange(false, std::memory_order_relaxed);
   };
-  return !stopped() && endpoint_.wait(deadline) && !stopped();
+  if (stopped()) return false;
+  const bool hasEvent = endpoint_.wait(deadline);
+  if (endpoint_.slept()) progress_.noteSleep();
+  return hasEvent && !stopped();
 }
 
 void ServerCore::interrupt() noexcept {
@@ -99,7 +102,7 @@ inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestI
                                   const Message& message) noexcept {
   if (times.sentTick != 0) {
     noteTimes(connection, requestId, times.sentTick);
-  } else if (progress_.isSlow()) {
+  } else if (progress_.isDue()) {
     progress_.note(Clock::nowNs());
   }
   progress_.begin(message);
@@ -173,7 +176,10 @@ Message ServerCore::receive() {
     const bool isPolled{index};
     if (!isPolled) index = nextOther();
     if (!index) {
-      if (hasDescriptor_ && !endpoint_.arm()) continue;
+      if (hasDescriptor_) {
+        if (!endpoint_.arm()) continue;
+        progress_.noteSleep();  // the caller sleeps at the descriptor
+      }
       endHandling();
       return {};
     }

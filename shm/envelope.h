@@ -19,7 +19,7 @@ struct Tick {
   [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept {
     return static_cast<std::uint32_t>(ns >> 4) | 1u;
   }
-  // Of a time or 0: 0 for 0.
+  // The tick of a message that is sent at this time; 0 if `ns` is 0: the message is not timed.
   [[nodiscard]] static std::uint32_t ofSample(std::int64_t ns) noexcept {
     return ns != 0 ? of(ns) : 0;
   }

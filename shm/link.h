@@ -173,7 +173,8 @@ class Link {
   void endFanOut() noexcept;
   // At the server: the number of chunks of the fan-out pool that the client holds.
   [[nodiscard]] std::uint32_t borrowedFanOut() noexcept { return pool_.loans().count(); }
-  // The time if the next message is to be timed (Envelope::sentTick), or 0.
+  // The time now if the next message is to be timed (Envelope::sentTick), otherwise 0. For each
+  // attempt to send.
   [[nodiscard]] std::int64_t timeOfNext() noexcept {
     const auto sent = out_.messages();
     const bool isDue = outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched
@@ -239,7 +240,7 @@ class Link {
       afterFencedPush();
   }
   void afterFencedPush() noexcept;
-  std::int64_t takeSample() noexcept;
+  std::int64_t takeSample() noexcept;  // reads the clock for the next message
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
 
   ForkGuard forkGuard_;

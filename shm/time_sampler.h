@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // TimeSampler: chooses which messages to a peer that does not poll get a time stamp: all of them,
-// or of fast traffic one in 2 to 64, because reading the clock costs as much as a message. The rate
-// of the last few milliseconds decides. The distance between samples varies, so that a burst is
-// sampled evenly, from its first message, which wakes the peer, to its last.
+// or of fast traffic one in 2 to 64, because reading the clock costs as much as a message. The
+// recent rate decides. The distance between samples varies, so that bursts are sampled evenly, from
+// their first messages, which wake the peer, to their last ones.
 //
 // Threads  one at a time.
 #pragma once
@@ -17,28 +17,37 @@ class TimeSampler {
  public:
   static constexpr std::uint64_t kMaxInterval = 64;  // messages from sample to sample, on average
 
-  // Whether to time the next message, before which `sent` messages were sent.
-  [[nodiscard]] bool isDue(std::uint64_t sent) const noexcept { return sent >= due_; }
+  // Whether to time the next message, before which `sent` messages were sent. If it was refused
+  // after note(), its next attempt is due, too.
+  [[nodiscard]] bool isDue(std::uint64_t sent) const noexcept {
+    return sent >= due_ || sent == timed_;
+  }
   // That message gets the time `nowNs`.
   void note(std::uint64_t sent, std::int64_t nowNs) noexcept {
-    if (const auto ns = nowNs - windowNs_; ns >= kWindowNs) {
-      const auto most = static_cast<std::uint64_t>(ns / kNsPerSample);
-      interval_ = std::clamp<std::uint64_t>((sent - windowSent_) / most, 1, kMaxInterval);
-      windowNs_ = nowNs;
-      windowSent_ = sent;
+    const auto messages = sent - periodSent_;
+    if (const auto ns = nowNs - periodNs_; ns >= kPeriodNs || messages >= kPeriodMessages) {
+      const auto elapsed = static_cast<std::uint64_t>(std::max<std::int64_t>(ns, 1));
+      interval_ = std::clamp<std::uint64_t>((messages * kNsPerSample + elapsed - 1) / elapsed, 1,
+                                            kMaxInterval);
+      periodNs_ = nowNs;
+      periodSent_ = sent;
     }
-    due_ = sent + (interval_ + 1) / 2 + random_() % interval_;
+    timed_ = sent;
+    due_ = sent + (interval_ + 1) / 2 + random_() % (interval_ | 1u);
   }
 
  private:
-  static constexpr std::int64_t kNsPerSample = 16'384;  // of fast traffic, on average
-  static constexpr std::int64_t kWindowNs = 4'000'000;
+  static constexpr std::uint64_t kNsPerSample = 16'384;  // of fast traffic, on average
+  // The rate is measured over this time or this number of messages, whichever comes first.
+  static constexpr std::int64_t kPeriodNs = 4'000'000;
+  static constexpr std::uint64_t kPeriodMessages = 1024;
 
   std::minstd_rand random_;
   std::uint64_t due_ = 0;
+  std::uint64_t timed_ = 0;  // messages sent before the last one that was timed
   std::uint64_t interval_ = 1;
-  std::int64_t windowNs_ = 0;  // the window in which messages are counted: when it began
-  std::uint64_t windowSent_ = 0;  // messages sent before it
+  std::int64_t periodNs_ = 0;  // start of the period
+  std::uint64_t periodSent_ = 0;  // messages sent before it
 };
 
 }  // namespace mpf

@@ -21,7 +21,7 @@ struct MpfPlaces {
   std::string serverBackplane;
   std::string clientBackplane;  // if it differs, a pair of routers joins both
   std::int32_t location = 0;
-  int queueSize = 1024;  // sizes the rings, too: a stream is slower through short ones
+  int queueSize = 1024;  // sets the length of the rings, too; short ones make a stream slower
   bool inBatches = false;  // the server sends with replyMany()
 };
 

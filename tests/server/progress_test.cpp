@@ -56,14 +56,27 @@ TEST_F(ProgressTest, ShowsTheTimeOfTheLastRequest) {
 TEST_F(ProgressTest, AServerIsSlowWhileItsRequestsTakeLong) {
   note(0, 1'000'000'000);
   note(10, 1'001'000'000);
-  EXPECT_TRUE(progress_.isSlow()) << "100 us for each request";
+  EXPECT_TRUE(progress_.isDue()) << "100 us for each request";
 
   note(1000, 1'002'000'000);
-  EXPECT_FALSE(progress_.isSlow()) << "1 us for each request";
+  EXPECT_FALSE(progress_.isDue()) << "1 us for each request";
 
   note(1, 1'003'000'000);
 
-  EXPECT_TRUE(progress_.isSlow());
+  EXPECT_TRUE(progress_.isDue());
+}
+
+TEST_F(ProgressTest, NotesTheFirstRequestAfterASleep) {
+  note(0, 1'000'000'000);
+  note(1000, 1'001'000'000);
+  ASSERT_FALSE(progress_.isDue());
+
+  progress_.noteSleep();
+  EXPECT_TRUE(progress_.isDue());
+
+  note(1, 2'000'000'000);
+  note(1000, 2'001'000'000);
+  EXPECT_FALSE(progress_.isDue());
 }
 
 }  // namespace

@@ -232,6 +232,18 @@ TEST_F(LinkTest, TimesSlowMessagesToASleepingPeerAndOneIn64ToAPollingOne) {
   EXPECT_EQ(timedOf(256), 4);
 }
 
+TEST_F(LinkTest, TimesAMessageThatIsSentAtTheSecondAttempt) {
+  const auto link = makeLink();
+  Link::execute(link.server.unwatch());
+  while (sendBody(link.client, {}) == LinkSend::sent) {
+  }
+  const auto first = link.client.timeOfNext();
+  ASSERT_EQ(sendBody(link.client, {}), LinkSend::full);
+
+  EXPECT_NE(first, 0);
+  EXPECT_NE(link.client.timeOfNext(), 0);
+}
+
 TEST_F(LinkTest, EachSideRemovesItsFilesAtDestruction) {
   const auto link = makeLink();
   const auto before = backplane_.segmentNames().size();

@@ -49,9 +49,9 @@ TEST(TimeSampler, TimesOneIn64OfFastTraffic) {
 
 TEST(TimeSampler, TimesOneFor16MicrosecondsOfTrafficBetween) {
   Traffic traffic;
-  traffic.timedOf(10'000, 2003);
+  traffic.timedOf(10'000, 2103);
 
-  EXPECT_NEAR(traffic.timedOf(80'000, 2003), 10'000, 1000);
+  EXPECT_NEAR(traffic.timedOf(80'000, 2103), 10'000, 1000);
 }
 
 TEST(TimeSampler, TimesThePartsOfABurstEvenly) {
@@ -79,12 +79,19 @@ TEST(TimeSampler, TimesAllMessagesAgainSoonAfterFastTraffic) {
   EXPECT_EQ(traffic.timedOf(100, 20'000), 100);
 }
 
-TEST(TimeSampler, LeavesTheSampleOfARefusedMessageToTheNext) {
+TEST(TimeSampler, TimesEachAttemptToSendAMessageThatIsDue) {
   TimeSampler sampler;
   sampler.note(0, 1'000'000'000);
 
-  EXPECT_FALSE(sampler.isDue(0));
-  EXPECT_TRUE(sampler.isDue(1));
+  EXPECT_TRUE(sampler.isDue(0));
+}
+
+TEST(TimeSampler, TimesFewMessagesOfALongBurstAfterARest) {
+  Traffic traffic;
+  traffic.timedOf(100, 20'000);
+  traffic.pass(1'000'000'000);
+
+  EXPECT_LE(traffic.timedOf(2048, 103), 1200);
 }
 
 }  // namespace
