@@ -65,10 +65,11 @@ class Camera {
       while (server_.handleOne()) continue;
     }
   }
-  // Publishes `count` images, each after this reader has reported the one before. Returns false
-  // when an image was dropped for it.
+  // Publishes `count` images, each after this reader has reported all that it was sent before.
+  // Returns false when an image was dropped for it.
   [[nodiscard]] bool tryShow(std::int32_t number, int count) {
     runUntil([&] { return readers_.contains(number); });
+    runUntil([&] { return readers_.at(number).received == readers_.at(number).sent; });
     for (int shown = 0; shown < count; ++shown) {
       publish();
       auto& reader = readers_.at(number);

@@ -66,7 +66,6 @@ TEST_F(FanOutTest, AStoppedReaderDelaysNobodyAndIsToldWhatItMissed) {
   const auto& stopped = camera.reader(1);
   EXPECT_GE(stopped.dropped - before, 200 - kMaxBorrowed);
   EXPECT_EQ(camera.reader(2).missed, camera.reader(2).dropped);
-  camera.runUntil([&] { return stopped.received == stopped.sent; });
   ASSERT_TRUE(camera.tryShow(1, 1));
   EXPECT_EQ(stopped.missed, stopped.dropped);
   EXPECT_FALSE(camera.wasCopied());
@@ -84,8 +83,6 @@ TEST_F(FanOutTest, AKilledReaderFreesWhatItHeld) {
     camera.runUntil([&] { return camera.hasReader(number); });
     const auto until = random() % 4;
     for (unsigned shown = 0; shown < until; ++shown) camera.publish();
-    const auto& lasting = camera.reader(1);
-    camera.runUntil([&] { return lasting.received == lasting.sent; });
     ASSERT_TRUE(camera.tryShow(1, 1));
     victim.end(SIGKILL);
     camera.runUntil(
