@@ -2,7 +2,8 @@
 // TimeSampler: chooses which messages to a peer that does not poll get a time stamp: all of them,
 // or of fast traffic one in 2 to 64, because reading the clock costs as much as a message. The
 // recent rate decides. The distance between samples varies, so that bursts are sampled evenly, from
-// their first messages, which wake the peer, to their last ones.
+// their first messages, which wake the peer, to their last ones. After a rest, all messages are
+// timed until the rate is known again.
 //
 // Threads  one at a time.
 #pragma once

@@ -2,6 +2,7 @@
 // ServerCore: which requests it returns, and which it ends itself.
 #include "server/server_core.h"
 
+#include <chrono>
 #include <gtest/gtest.h>
 
 #include "tests/shm/endpoint_pair.h"
@@ -115,6 +116,29 @@ TEST_F(ServerCoreTest, AnInterruptEndsOneWait) {
 
   EXPECT_TRUE(server_->wait(Deadline::never()));
   EXPECT_TRUE(server_->receive());
+}
+
+TEST_F(ServerCoreTest, NotesTheTimeOfTheFirstRequestAfterASleep) {
+  const auto& control = link_->peer()->control();
+  sendRequest(1);
+  ASSERT_TRUE(server_->receive());
+  ASSERT_EQ(control.progressAtNs.load(), 0u) << "the request has no time stamp";
+
+  while (control.wakes.load() == 0)
+    ASSERT_FALSE(server_->wait(Deadline::after(std::chrono::milliseconds(1))));
+  sendRequest(2);
+  ASSERT_TRUE(server_->receive());
+
+  EXPECT_NE(control.progressAtNs.load(), 0u);
+}
+
+TEST_F(ServerCoreTest, NotesTheTimeOfTheFirstRequestAfterItsDescriptorWasArmed) {
+  server_->descriptor();
+  ASSERT_FALSE(server_->receive());
+  sendRequest(1);
+  ASSERT_TRUE(server_->receive());
+
+  EXPECT_NE(link_->peer()->control().progressAtNs.load(), 0u);
 }
 
 TEST_F(ServerCoreTest, AQueueSizeOutsideTheLimitsIsAnError) {
