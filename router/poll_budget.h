@@ -15,8 +15,8 @@ namespace mpf::router {
 
 class PollBudget {
  public:
-  // Longer than most round trips on a local network, including two wake-ups.
-  static constexpr std::int64_t kMaxNs = 100'000;
+  // Longer than most round trips of a hundred messages on a local network, including wake-ups.
+  static constexpr std::int64_t kMaxNs = 200'000;
 
   [[nodiscard]] std::int64_t ns() const noexcept { return kMaxNs >> halvings_; }
   // The time between two bursts of traffic.

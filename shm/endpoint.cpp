@@ -147,7 +147,8 @@ bool Endpoint::spin(Deadline deadline) noexcept {
   if (mode_ == WaitMode::block) return false;
   const bool isAdaptive = mode_ == WaitMode::adaptive;
   const auto budgetNs = isAdaptive ? spinBudget_.ns() : INT64_MAX;
-  const bool yields = isAdaptive && spinBudget_.takeYielding();
+  const auto plan = isAdaptive ? processor_.plan() : SharedProcessor::Plan::keep;
+  if (plan == SharedProcessor::Plan::sleep) return false;
   std::int64_t startNs = 0;
   for (std::uint32_t spins = 1;; ++spins) {
     // Messages of polled links are the events that need a fast reaction.
@@ -160,9 +161,12 @@ bool Endpoint::spin(Deadline deadline) noexcept {
     const auto nowNs = Clock::nowNs();
     if (startNs == 0) startNs = nowNs;
     if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
-    if (yields) {
+    if (plan == SharedProcessor::Plan::yield) {
       ::sched_yield();
-      spinBudget_.noteYield(Clock::nowNs() - nowNs);
+      const auto yieldNs = Clock::nowNs() - nowNs;
+      const bool hasEvent = hasEvents();
+      processor_.noteYield(yieldNs, hasEvent);
+      if (hasEvent) return true;
     }
     if (spins % kScanEvery != 0) continue;
     tryScanAllLinks();

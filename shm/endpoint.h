@@ -29,6 +29,7 @@
 #include "shm/link.h"
 #include "shm/peer_windows.h"
 #include "shm/ready_bits.h"
+#include "shm/shared_processor.h"
 #include "shm/spin_budget.h"
 
 namespace mpf {
@@ -148,6 +149,7 @@ class Endpoint {
   std::uint64_t sleepNumber_ = 0;  // number of the last sleep that was announced
   bool slept_ = false;
   SpinBudget spinBudget_;
+  SharedProcessor processor_;
   std::int64_t scannedAllNs_ = 0;  // time of the last scan of all links
   PeerWindows peers_;  // the last member: destroyed first, because deaths interrupt()
 };

@@ -10,6 +10,7 @@
 #include <mpf/clock.h>
 
 #include "base/step.h"
+#include "shm/notice_batch.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -227,7 +228,7 @@ bool Link::tryAllowMore() noexcept {
 }
 
 void Link::notifyPeer() noexcept {
-  if (peer_) peer_->notify(peerIndex_);
+  if (peer_) NoticeBatch::notify(peer_, peerIndex_);
 }
 
 LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> body,

@@ -10,6 +10,7 @@
 #include "router/transport/kj_text.h"
 #include "router/transport/tls.h"
 #include "shm/histogram.h"
+#include "shm/notice_batch.h"
 
 namespace mpf::router {
 namespace {
@@ -152,6 +153,7 @@ bool Line::handleSome() {
   if (items_) keepAlive_.received(Clock::nowNs());  // the peer is not late: its items were waiting
   noteKind_ = SendQueue::NoteKind::answer;
   KJ_DEFER(noteKind_ = SendQueue::NoteKind::own);
+  NoticeBatch notices;
   for (unsigned handled = 1; !queue_.hasMaxAnswers(); ++handled) {
     if (handled % kItemsPerCheck == 0 && Clock::nowNs() >= endNs) return false;
     if (!items_ && !tryNextFrame()) return true;
@@ -160,7 +162,10 @@ bool Line::handleSome() {
       continue;
     }
     const auto at = nextItem_++;
-    if (!tryHandlePlain(at)) handle((*items_)[at]);
+    if (!tryHandlePlain(at)) {
+      handle((*items_)[at]);
+      notices.give();
+    }
     if (discardsInput()) return true;
   }
   return false;

@@ -40,41 +40,5 @@ TEST(SpinBudget, HalvesWithEachLongSleepUntilOneIsShort) {
   EXPECT_EQ(budget.ns(), full);
 }
 
-// The number of waits that keep the processor.
-int countKeeps(SpinBudget& budget) {
-  int keeps = 0;
-  while (!budget.takeYielding()) ++keeps;
-  return keeps;
-}
-
-constexpr std::int64_t kLong = 2'000'000;
-
-TEST(SpinBudget, KeepsTheProcessorForSomeWaitsWhenOthersUseIt) {
-  SpinBudget budget;
-  EXPECT_EQ(countKeeps(budget), 0);
-
-  budget.noteYield(kLong);
-
-  const auto first = countKeeps(budget);
-  EXPECT_GT(first, 0);
-  EXPECT_TRUE(budget.takeYielding()) << "then it tries again";
-  for (int i = 0; i < 20; ++i) budget.noteYield(kLong);
-  EXPECT_GT(countKeeps(budget), 1000 * first) << "and less and less often";
-}
-
-TEST(SpinBudget, GivesTheProcessorUpAgainWhenOthersUseItBriefly) {
-  SpinBudget budget;
-  budget.noteYield(kLong);
-  const auto first = countKeeps(budget);
-  for (int i = 0; i < 20; ++i) budget.noteYield(kLong);
-  countKeeps(budget);
-
-  for (int i = 0; i < 2000; ++i) budget.noteYield(100);
-
-  EXPECT_EQ(countKeeps(budget), 0);
-  budget.noteYield(kLong);
-  EXPECT_EQ(countKeeps(budget), first);
-}
-
 }  // namespace
 }  // namespace mpf::test
