@@ -15,7 +15,8 @@ namespace mpf::router {
 
 class PollBudget {
  public:
-  // Longer than most round trips of a hundred messages on a local network, including wake-ups.
+  // Longer than a hundred requests and their replies usually take on a local network, including
+  // wake-ups.
   static constexpr std::int64_t kMaxNs = 200'000;
 
   [[nodiscard]] std::int64_t ns() const noexcept { return kMaxNs >> halvings_; }

@@ -148,30 +148,37 @@ bool Endpoint::spin(Deadline deadline) noexcept {
   const bool isAdaptive = mode_ == WaitMode::adaptive;
   const auto budgetNs = isAdaptive ? spinBudget_.ns() : INT64_MAX;
   const auto plan = isAdaptive ? processor_.plan() : SharedProcessor::Plan::keep;
-  if (plan == SharedProcessor::Plan::sleep) return false;
+  // After a short deadline, a sleep would end late.
+  if (plan == SharedProcessor::Plan::sleep && deadline.left().count() > budgetNs) return false;
   std::int64_t startNs = 0;
   for (std::uint32_t spins = 1;; ++spins) {
     // Messages of polled links are the events that need a fast reaction.
     for (int looks = 0; looks < kLooksAtPolled; ++looks) {
       cpuRelax();
-      if (hot_.hasMessage()) return true;
+      if (hot_.hasMessage()) return foundByPolling();
     }
-    if (hasEvents()) return true;
+    if (hasEvents()) return foundByPolling();
     if (spins % kClockEvery != 0) continue;
     const auto nowNs = Clock::nowNs();
     if (startNs == 0) startNs = nowNs;
     if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
-    if (plan == SharedProcessor::Plan::yield) {
+    if (plan != SharedProcessor::Plan::keep) {
       ::sched_yield();
       const auto yieldNs = Clock::nowNs() - nowNs;
       const bool hasEvent = hasEvents();
       processor_.noteYield(yieldNs, hasEvent);
       if (hasEvent) return true;
+      if (plan == SharedProcessor::Plan::yield && processor_.hasMaxEmpty()) return false;
     }
     if (spins % kScanEvery != 0) continue;
     tryScanAllLinks();
     if (!isAdaptive) ::sched_yield();
   }
+}
+
+bool Endpoint::foundByPolling() noexcept {
+  processor_.notePolled();
+  return true;
 }
 
 void Endpoint::announce(layout::SleepState how) noexcept {

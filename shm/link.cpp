@@ -228,7 +228,7 @@ bool Link::tryAllowMore() noexcept {
 }
 
 void Link::notifyPeer() noexcept {
-  if (peer_) NoticeBatch::notify(peer_, peerIndex_);
+  if (peer_) peer_->notify(peerIndex_);
 }
 
 LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> body,
@@ -316,7 +316,10 @@ void Link::endFanOut() noexcept {
 void Link::afterFencedPush() noexcept {
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
-  if (outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched) notifyPeer();
+  if (!peer_ || outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched) return;
+  // A receiver that sleeps must not find its ring full when it wakes up.
+  const auto room = std::min(header().queueSize, geometry_.replySlots);
+  NoticeBatch::notify(peer_, peerIndex_, room / 2);
 }
 
 std::int64_t Link::takeSample() noexcept {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// NoticeBatch: while it exists, the thread that made it notifies the receiver of a run of messages
-// once, at the end of the run, instead of at the first message. A receiver that sleeps on the same
-// processor would otherwise interrupt the sender for each of the first messages.
+// NoticeBatch: delays the notices of its thread. Consecutive messages on one link cause one notice,
+// after the last of them. Otherwise the first notice would wake a receiver on the same processor,
+// which preempts the sender, takes one message and sleeps again, several times in a run.
 //
-// Threads  the one that made it. A thread has one at a time.
+// Threads  the one that made it. At most one for each thread.
 #pragma once
 
+#include <cassert>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -16,7 +17,10 @@ namespace mpf {
 
 class NoticeBatch {
  public:
-  NoticeBatch() noexcept { current_ = this; }
+  NoticeBatch() noexcept {
+    assert(current_ == nullptr);
+    current_ = this;
+  }
   ~NoticeBatch() {
     give();
     current_ = nullptr;
@@ -24,27 +28,34 @@ class NoticeBatch {
   NoticeBatch(const NoticeBatch&) = delete;
   NoticeBatch& operator=(const NoticeBatch&) = delete;
 
-  // Ends the run: gives the notice that is held.
+  // Gives the notice that is delayed, if there is one.
   void give() noexcept {
+    held_ = 0;
     if (const auto peer = std::exchange(peer_, nullptr)) peer->notify(link_);
   }
-  // Notifies the owner of `peer` of link `link`, or holds the notice if this thread has a batch.
-  static void notify(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link) noexcept {
+  // Notifies the owner of `peer` of link `link`. If this thread has a batch, that delays the notice
+  // until the run has `most` messages.
+  static void notify(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link,
+                     std::uint32_t most) noexcept {
     if (current_ == nullptr) peer->notify(link);
-    else current_->hold(peer, link);
+    else current_->delay(peer, link, most);
   }
 
  private:
-  void hold(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link) noexcept {
-    if (peer_ == peer && link_ == link) return;
-    give();
-    peer_ = peer;
-    link_ = link;
+  void delay(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link,
+             std::uint32_t most) noexcept {
+    if (peer_ != peer || link_ != link) {
+      give();
+      peer_ = peer;
+      link_ = link;
+    }
+    if (++held_ >= most) give();
   }
 
   static inline constinit thread_local NoticeBatch* current_ = nullptr;
-  std::shared_ptr<PeerWindow> peer_;  // nullptr: no notice is held
+  std::shared_ptr<PeerWindow> peer_;  // nullptr: no notice is delayed
   std::uint32_t link_ = 0;
+  std::uint32_t held_ = 0;  // messages since the last notice
 };
 
 }  // namespace mpf

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// SharedProcessor: what a wait that polls does about others that need its processor. The peer may be
-// among them, or the router on the way to it.
+// SharedProcessor: decides whether a wait polls, and whether it yields the processor while it
+// polls. Another thread on this processor may be the peer, or the router on the way to it.
 //
-//   yield   polls, and gives the processor up now and then
-//   keep    polls and keeps the processor: others use it for long, so they are not the peer, and a
-//           message may come within their time slice
-//   sleep   does not poll: giving the processor up has let others run for a short time, but brought
-//           no message; a wake-up then costs less than taking turns with them
+//   yield   polls, and calls sched_yield() at each look at the clock
+//   keep    polls without yielding: a yield lasted a millisecond or more, so another program uses
+//           the processor, and a message could arrive during its time slice
+//   sleep   sleeps at once: the last yields let other threads run briefly, and no event followed;
+//           a wake-up costs less than switching to these threads and back
 //
 // Threads  one owner thread.
 #pragma once
@@ -19,32 +19,36 @@ namespace mpf {
 class SharedProcessor {
  public:
   enum class Plan { yield, keep, sleep };
-  // Begins a wait.
+  // Returns the plan of the next wait. Call it once for each wait.
   [[nodiscard]] Plan plan() noexcept {
     if (keeps_ != 0) {
       --keeps_;
       return Plan::keep;
     }
-    return inVain_ < kMaxInVain || ++sleeps_ % kYieldEvery == 0 ? Plan::yield : Plan::sleep;
+    return !hasMaxEmpty() || ++waitsAtMax_ % kYieldEvery == 0 ? Plan::yield : Plan::sleep;
   }
-  // A wait has given the processor up for this duration; `hasEvents`: then it had something to do.
+  // Whether the last yields were so often empty that a wait should not poll any longer.
+  [[nodiscard]] bool hasMaxEmpty() const noexcept { return emptyYields_ == kMaxEmptyYields; }
+  // Records a yield of this duration. `hasEvents`: there was an event after it.
   void noteYield(std::int64_t ns, bool hasEvents) noexcept {
-    if (hasEvents) inVain_ = 0;
-    else if (ns >= kOthersRanNs && ns < kStreamNs) inVain_ = std::min(inVain_ + 1, kMaxInVain);
+    if (hasEvents || ns < kOthersRanNs) emptyYields_ = 0;
+    else if (ns < kStreamNs) emptyYields_ = std::min(emptyYields_ + 1, kMaxEmptyYields);
     if (ns < kLongYieldNs) {
       lastKeeps_ -= (lastKeeps_ + kForgetting - 1) / kForgetting;
     } else {
       keeps_ = lastKeeps_ = std::min(2 * lastKeeps_ + kFirstKeeps, kMaxKeeps);
     }
   }
+  // A wait has found an event while it polled: the sender runs on another processor.
+  void notePolled() noexcept { emptyYields_ = 0; }
 
  private:
-  // A yield takes less if no other process can run: 0.8 us where two changes of process take 4.
+  // During a shorter yield no other thread ran: it takes 0.8 us where two context switches take 4.
   static constexpr std::int64_t kOthersRanNs = 1500;
-  // A router that works longer has a stream of messages: the next ones come soon.
+  // A longer yield does not count: the router is handling a stream, so the next message comes soon.
   static constexpr std::int64_t kStreamNs = 40'000;
-  static constexpr std::uint32_t kMaxInVain = 4;  // in succession
-  static constexpr std::uint32_t kYieldEvery = 64;  // waits
+  static constexpr std::uint32_t kMaxEmptyYields = 4;
+  static constexpr std::uint32_t kYieldEvery = 64;
   static constexpr std::int64_t kLongYieldNs = 1'000'000;
   static constexpr std::uint32_t kFirstKeeps = 8;
   static constexpr std::uint32_t kMaxKeeps = 1u << 14;
@@ -52,8 +56,8 @@ class SharedProcessor {
 
   std::uint32_t keeps_ = 0;  // waits that will keep the processor
   std::uint32_t lastKeeps_ = 0;  // after the last long yield
-  std::uint32_t inVain_ = 0;  // yields in succession that brought nothing
-  std::uint32_t sleeps_ = 0;  // waits with this plan
+  std::uint32_t emptyYields_ = 0;  // brief ones without an event, in succession
+  std::uint32_t waitsAtMax_ = 0;  // each kYieldEvery-th of them yields
 };
 
 }  // namespace mpf

@@ -163,6 +163,7 @@ bool Line::handleSome() {
     }
     const auto at = nextItem_++;
     if (!tryHandlePlain(at)) {
+      notices.give();  // this item may take long
       handle((*items_)[at]);
       notices.give();
     }

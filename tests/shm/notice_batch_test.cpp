@@ -1,38 +1,16 @@
 // SPDX-License-Identifier: MIT
-// NoticeBatch: one notice for a run of messages to the same receiver.
+// NoticeBatch: one notice for a run of messages on a link.
 #include "shm/notice_batch.h"
 
-#include <gtest/gtest.h>
 #include <optional>
-#include <string>
 #include <thread>
 #include <utility>
 
-#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/receiver.h"
 #include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
-
-// A server that sleeps, and the client side of a link to it.
-struct Receiver {
-  Receiver(const Backplane& backplane, const std::string& name)
-      : server(backplane, name, WaitMode::block),
-        client(backplane, "", WaitMode::block),
-        link(connect(client, server)) {
-    static_cast<void>(wasNotified());
-  }
-  void receives() const { EXPECT_EQ(send(link.client, 1), LinkSend::sent); }
-  // Since the last call.
-  [[nodiscard]] bool wasNotified() {
-    auto& bits = server.endpoint.window().hints().readyBits[0];
-    return bits.exchange(0, std::memory_order_relaxed) != 0;
-  }
-
-  End server;
-  End client;
-  Connected link;
-};
 
 class NoticeBatchTest : public ShmTest {
  protected:
@@ -42,50 +20,60 @@ class NoticeBatchTest : public ShmTest {
     ShmTest::TearDown();
   }
 
-  std::optional<Receiver> one_{std::in_place, backplane_, "one"};
+  std::optional<Receiver> one_{std::in_place, backplane_, "one", Offer{.queueSize = 64}};
   std::optional<Receiver> two_{std::in_place, backplane_, "two"};
 };
 
 TEST_F(NoticeBatchTest, NotifiesAtItsEnd) {
   {
     const NoticeBatch batch;
-    one_->receives();
-    one_->receives();
+    one_->sendOne();
+    one_->sendOne();
     EXPECT_FALSE(one_->wasNotified());
   }
 
   EXPECT_TRUE(one_->wasNotified());
-  one_->receives();
-  EXPECT_TRUE(one_->wasNotified()) << "as before the batch";
+  one_->sendOne();
+  EXPECT_TRUE(one_->wasNotified()) << "without a batch, at once";
 }
 
-TEST_F(NoticeBatchTest, NotifiesOneReceiverBeforeItHoldsTheNoticeOfAnother) {
+TEST_F(NoticeBatchTest, NotifiesWhenAMessageGoesToAnotherLink) {
   const NoticeBatch batch;
-  one_->receives();
+  one_->sendOne();
 
-  two_->receives();
+  two_->sendOne();
 
   EXPECT_TRUE(one_->wasNotified());
   EXPECT_FALSE(two_->wasNotified());
 }
 
-TEST_F(NoticeBatchTest, GivesItsNoticeOnceOnRequest) {
+TEST_F(NoticeBatchTest, NotifiesWhenHalfOfTheQueueIsFull) {
+  const NoticeBatch batch;
+  for (int i = 1; i < 32; ++i) one_->sendOne();
+  EXPECT_FALSE(one_->wasNotified());
+
+  one_->sendOne();
+
+  EXPECT_TRUE(one_->wasNotified());
+  one_->sendOne();
+  EXPECT_FALSE(one_->wasNotified()) << "it begins a new run";
+}
+
+TEST_F(NoticeBatchTest, GivesADelayedNoticeOnce) {
   NoticeBatch batch;
-  one_->receives();
+  one_->sendOne();
 
   batch.give();
 
   EXPECT_TRUE(one_->wasNotified());
   batch.give();
   EXPECT_FALSE(one_->wasNotified());
-  one_->receives();
-  EXPECT_FALSE(one_->wasNotified()) << "a new run";
 }
 
-TEST_F(NoticeBatchTest, DoesNotHoldTheNoticesOfOtherThreads) {
+TEST_F(NoticeBatchTest, DoesNotDelayTheNoticesOfOtherThreads) {
   const NoticeBatch batch;
 
-  std::thread([this] { one_->receives(); }).join();
+  std::thread([this] { one_->sendOne(); }).join();
 
   EXPECT_TRUE(one_->wasNotified());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SharedProcessor: what a wait that polls learns from giving its processor up.
+// SharedProcessor: the plan of the next wait after yields of several durations.
 #include "shm/shared_processor.h"
 
 #include <gtest/gtest.h>
@@ -9,18 +9,18 @@ namespace {
 
 using Plan = SharedProcessor::Plan;
 
-constexpr std::int64_t kAloneNs = 800;  // nobody else could run
+constexpr std::int64_t kAloneNs = 800;  // no other thread ran
 constexpr std::int64_t kBriefNs = 10'000;
 constexpr std::int64_t kStreamNs = 100'000;
 constexpr std::int64_t kLongNs = 2'000'000;
 
 class SharedProcessorTest : public testing::Test {
  protected:
-  void noteYields(int number, std::int64_t ns, bool hasEvents) {
+  void noteYields(int number, std::int64_t ns, bool hasEvents = false) {
     for (int i = 0; i < number; ++i) processor_.noteYield(ns, hasEvents);
   }
-  // The number of waits before one that yields; all of them have this plan.
-  int countUntilYield(Plan plan) {
+  // Counts the waits before the next Plan::yield; each of them must have this plan.
+  int countWaits(Plan plan) {
     for (int waits = 0;; ++waits) {
       const auto next = processor_.plan();
       if (next == Plan::yield) return waits;
@@ -31,56 +31,76 @@ class SharedProcessorTest : public testing::Test {
   SharedProcessor processor_;
 };
 
-TEST_F(SharedProcessorTest, KeepsItForSomeWaitsWhenOthersUseIt) {
-  EXPECT_EQ(countUntilYield(Plan::keep), 0);
+TEST_F(SharedProcessorTest, KeepsTheProcessorAfterALongYield) {
+  EXPECT_EQ(countWaits(Plan::keep), 0);
 
-  processor_.noteYield(kLongNs, false);
+  noteYields(1, kLongNs);
 
-  const auto first = countUntilYield(Plan::keep);
+  const auto first = countWaits(Plan::keep);
   EXPECT_GT(first, 0);
-  noteYields(20, kLongNs, false);
-  EXPECT_GT(countUntilYield(Plan::keep), 1000 * first) << "and yields less and less often";
+  noteYields(20, kLongNs);
+  EXPECT_GT(countWaits(Plan::keep), 1000 * first) << "and longer after each further one";
 }
 
-TEST_F(SharedProcessorTest, YieldsAgainWhenOthersUseItBriefly) {
-  processor_.noteYield(kLongNs, false);
-  const auto first = countUntilYield(Plan::keep);
-  noteYields(20, kLongNs, false);
-  countUntilYield(Plan::keep);
+TEST_F(SharedProcessorTest, YieldsAgainAfterShorterYields) {
+  noteYields(1, kLongNs);
+  const auto first = countWaits(Plan::keep);
+  noteYields(20, kLongNs);
+  countWaits(Plan::keep);
 
-  noteYields(2000, kAloneNs, false);
+  noteYields(2000, kAloneNs);
 
-  EXPECT_EQ(countUntilYield(Plan::keep), 0);
-  processor_.noteYield(kLongNs, false);
-  EXPECT_EQ(countUntilYield(Plan::keep), first);
+  EXPECT_EQ(countWaits(Plan::keep), 0);
+  noteYields(1, kLongNs);
+  EXPECT_EQ(countWaits(Plan::keep), first);
 }
 
-TEST_F(SharedProcessorTest, SleepsWhenOthersRanInVain) {
-  noteYields(3, kBriefNs, false);
-  EXPECT_EQ(countUntilYield(Plan::sleep), 0);
+TEST_F(SharedProcessorTest, SleepsAfterFourBriefYieldsWithoutAnEvent) {
+  noteYields(3, kBriefNs);
+  EXPECT_FALSE(processor_.hasMaxEmpty());
+  EXPECT_EQ(countWaits(Plan::sleep), 0);
 
-  processor_.noteYield(kBriefNs, false);
+  noteYields(1, kBriefNs);
 
-  EXPECT_EQ(countUntilYield(Plan::sleep), 63) << "then it tries again";
-  EXPECT_EQ(countUntilYield(Plan::sleep), 63);
+  EXPECT_TRUE(processor_.hasMaxEmpty());
+  EXPECT_EQ(countWaits(Plan::sleep), 63) << "then it tries again";
+  EXPECT_EQ(countWaits(Plan::sleep), 63);
 }
 
-TEST_F(SharedProcessorTest, YieldsAgainOnceThatBroughtAMessage) {
-  noteYields(10, kBriefNs, false);
-  ASSERT_GT(countUntilYield(Plan::sleep), 0);
+TEST_F(SharedProcessorTest, PollsAgainAfterAYieldWithAnEvent) {
+  noteYields(10, kBriefNs);
 
-  processor_.noteYield(kBriefNs, true);
+  noteYields(1, kBriefNs, true);
 
-  noteYields(3, kBriefNs, false);
-  EXPECT_EQ(countUntilYield(Plan::sleep), 0) << "as at first";
+  EXPECT_EQ(countWaits(Plan::sleep), 0);
+  noteYields(3, kBriefNs);
+  EXPECT_EQ(countWaits(Plan::sleep), 0) << "it counts from the beginning";
 }
 
-TEST_F(SharedProcessorTest, PollsWhenNobodyElseRunsOrOthersHaveMuchToDo) {
-  noteYields(100, kAloneNs, false);
-  EXPECT_EQ(countUntilYield(Plan::sleep), 0);
+TEST_F(SharedProcessorTest, PollsAgainAfterAnEventWithoutAYield) {
+  noteYields(10, kBriefNs);
 
-  noteYields(100, kStreamNs, false);
-  EXPECT_EQ(countUntilYield(Plan::sleep), 0);
+  processor_.notePolled();
+
+  EXPECT_EQ(countWaits(Plan::sleep), 0);
+}
+
+TEST_F(SharedProcessorTest, PollsAgainWhenNoOtherThreadRuns) {
+  noteYields(10, kBriefNs);
+
+  noteYields(1, kAloneNs);
+
+  EXPECT_EQ(countWaits(Plan::sleep), 0);
+}
+
+TEST_F(SharedProcessorTest, DoesNotCountTheYieldsOfAStream) {
+  noteYields(100, kStreamNs);
+  EXPECT_EQ(countWaits(Plan::sleep), 0);
+
+  noteYields(3, kBriefNs);
+  noteYields(1, kStreamNs);
+  noteYields(1, kBriefNs);
+  EXPECT_EQ(countWaits(Plan::sleep), 63) << "nor do they count as success";
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Line: plain items, between others, in parts, and at the end of a connection.
 #include "tests/router/transport/line_fixture.h"
+#include "tests/shm/receiver.h"
+#include "tests/support/test_backplane.h"
 
 namespace mpf::test {
 namespace {
@@ -89,6 +91,48 @@ TEST_F(LinePlainTest, HandlesNothingBehindAProtocolError) {
 
   EXPECT_THAT(farewell(), AllOf(HasSubstr("code = limit"), HasSubstr("too many")));
   EXPECT_THAT(said_, ElementsAre("plain 1", "plain 2"));
+}
+
+// A router that hands each plain item to a receiver on its host.
+class LineNoticesTest : public LinePlainTest {
+ protected:
+  void SetUp() override {
+    onPlain_ = [this](PlainItem&) {
+      receiver_.sendOne();
+      noteNotice();
+    };
+    onItem_ = [this](wire::Item::Reader) { noteNotice(); };
+    startGreeted();
+  }
+  void noteNotice() { said_.emplace_back(receiver_.wasNotified() ? "notified" : "delayed"); }
+
+  TestBackplane backplane_;
+  Receiver receiver_{backplane_, "receiver"};
+};
+
+TEST_F(LineNoticesTest, AreDelayedToTheEndOfARun) {
+  send(joined({plainFrame(1, 1), plainFrame(2, 2)}));
+
+  EXPECT_THAT(said_, ElementsAre("delayed", "delayed", "delayed"));
+  EXPECT_TRUE(receiver_.wasNotified());
+}
+
+TEST_F(LineNoticesTest, PrecedeAnItemThatIsNotPlain) {
+  send(frameOf({request(1, 0), [](wire::Item::Builder item) { item.setClose(3); }, request(4, 0)}));
+
+  EXPECT_THAT(said_, ElementsAre("delayed", "notified", "(close = 3)", "delayed"));
+  EXPECT_TRUE(receiver_.wasNotified());
+}
+
+TEST_F(LineNoticesTest, AreGivenAfterAProtocolError) {
+  onItem_ = [this](wire::Item::Reader) {
+    receiver_.sendOne();
+    throw ProtocolError(FarewellCode::LIMIT, "too many");
+  };
+
+  send(frameOf({[](wire::Item::Builder item) { item.setClose(3); }}));
+
+  EXPECT_TRUE(receiver_.wasNotified());
 }
 
 TEST_F(LinePlainTest, IsNoGreeting) {
