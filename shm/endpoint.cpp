@@ -148,7 +148,7 @@ bool Endpoint::spin(Deadline deadline) noexcept {
   const bool isAdaptive = mode_ == WaitMode::adaptive;
   const auto budgetNs = isAdaptive ? spinBudget_.ns() : INT64_MAX;
   const auto plan = isAdaptive ? processor_.plan() : SharedProcessor::Plan::keep;
-  // After a short deadline, a sleep would end late.
+  // A sleep until a deadline this near would end after it.
   if (plan == SharedProcessor::Plan::sleep && deadline.left().count() > budgetNs) return false;
   std::int64_t startNs = 0;
   for (std::uint32_t spins = 1;; ++spins) {
@@ -168,7 +168,6 @@ bool Endpoint::spin(Deadline deadline) noexcept {
       const bool hasEvent = hasEvents();
       processor_.noteYield(yieldNs, hasEvent);
       if (hasEvent) return true;
-      if (plan == SharedProcessor::Plan::yield && processor_.hasMaxEmpty()) return false;
     }
     if (spins % kScanEvery != 0) continue;
     tryScanAllLinks();

@@ -2,8 +2,8 @@
 // Endpoint: a window and the links that end at it; waits for the next message of any of the links.
 //
 //   next   HotLinks: poll the busy links ─► ReadyBits: look at links with hints
-//   wait   the same for a while (SpinBudget), if that makes sense (SharedProcessor) ─► announce the
-//          sleep, look again, sleep
+//   wait   the same for a while (SpinBudget), unless SharedProcessor says to sleep at once ─►
+//          announce the sleep, look again, sleep
 //   control events, which are not of a link: Knocks, and local events such as a death (PeerWindows)
 //
 // Idle links cost nothing, however many there are: the endpoint looks at a link that it does not

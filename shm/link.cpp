@@ -317,8 +317,8 @@ void Link::afterFencedPush() noexcept {
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
   if (!peer_ || outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched) return;
-  // A receiver that sleeps must not find its ring full when it wakes up.
-  const auto room = std::min(header().queueSize, geometry_.replySlots);
+  // The receiver must wake up before the ring is full.
+  const auto room = side_ == LinkSide::client ? header().queueSize : geometry_.replySlots;
   NoticeBatch::notify(peer_, peerIndex_, room / 2);
 }
 

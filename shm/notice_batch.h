@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // NoticeBatch: delays the notices of its thread. Consecutive messages on one link cause one notice,
-// after the last of them. Otherwise the first notice would wake a receiver on the same processor,
-// which preempts the sender, takes one message and sleeps again, several times in a run.
+// after the last of them, or before, if there are many. Otherwise the first notice would wake a
+// receiver on the same processor, which preempts the sender, takes one message and sleeps again,
+// several times in a run.
 //
-// Threads  the one that made it. At most one for each thread.
+// Threads  used by the thread that made it, which has no other batch at that time.
 #pragma once
 
 #include <cassert>
@@ -30,7 +31,7 @@ class NoticeBatch {
 
   // Gives the notice that is delayed, if there is one.
   void give() noexcept {
-    held_ = 0;
+    delayed_ = 0;
     if (const auto peer = std::exchange(peer_, nullptr)) peer->notify(link_);
   }
   // Notifies the owner of `peer` of link `link`. If this thread has a batch, that delays the notice
@@ -49,13 +50,13 @@ class NoticeBatch {
       peer_ = peer;
       link_ = link;
     }
-    if (++held_ >= most) give();
+    if (++delayed_ >= most) give();
   }
 
   static inline constinit thread_local NoticeBatch* current_ = nullptr;
   std::shared_ptr<PeerWindow> peer_;  // nullptr: no notice is delayed
   std::uint32_t link_ = 0;
-  std::uint32_t held_ = 0;  // messages since the last notice
+  std::uint32_t delayed_ = 0;  // messages since the last notice
 };
 
 }  // namespace mpf

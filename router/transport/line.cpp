@@ -10,7 +10,6 @@
 #include "router/transport/kj_text.h"
 #include "router/transport/tls.h"
 #include "shm/histogram.h"
-#include "shm/notice_batch.h"
 
 namespace mpf::router {
 namespace {
@@ -162,7 +161,7 @@ bool Line::handleSome() {
       continue;
     }
     const auto at = nextItem_++;
-    if (!tryHandlePlain(at)) {
+    if (!tryHandlePlain(at, notices)) {
       notices.give();  // this item may take long
       handle((*items_)[at]);
       notices.give();
@@ -188,9 +187,11 @@ bool Line::tryNextFrame() {
 }
 
 // Returns false, and has done nothing, when the item is not plain.
-bool Line::tryHandlePlain(capnp::uint index) {
+bool Line::tryHandlePlain(capnp::uint index, NoticeBatch& notices) {
   if (!plain_ || state_ != State::open || !events_.onPlain) return false;
+  const auto client = plainItem_.client;
   if (!plain_->tryRead(index, plainItem_)) return false;
+  if (plainItem_.client != client) notices.give();  // the next messages may cause no notice
   count(record_->messagesReceived);
   events_.onPlain(plainItem_);
   return true;

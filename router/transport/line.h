@@ -37,6 +37,7 @@
 #include "router/transport/peer_greeting.h"
 #include "router/transport/plain_item.h"
 #include "router/transport/send_queue.h"
+#include "shm/notice_batch.h"
 
 namespace mpf::router {
 
@@ -119,7 +120,7 @@ class Line {
   kj::Promise<void> whenAnswersAreSent();
   bool handleSome();
   bool tryNextFrame();
-  bool tryHandlePlain(capnp::uint index);
+  bool tryHandlePlain(capnp::uint index, NoticeBatch& notices);
   void handle(wire::Item::Reader item);
   void takeGreeting(wire::Greeting::Reader greeting);
   [[nodiscard]] std::string closedReason() const;

@@ -124,6 +124,30 @@ TEST_F(LineNoticesTest, PrecedeAnItemThatIsNotPlain) {
   EXPECT_TRUE(receiver_.wasNotified());
 }
 
+TEST_F(LineNoticesTest, PrecedeTheItemsOfAnotherClient) {
+  PlainRun run;
+  for (const std::uint32_t client : {1, 1, 2}) {
+    auto item = plain(1);
+    item.client = client;
+    run.append(item);
+  }
+  onPlain_ = nullptr;
+  run.buildHead();
+
+  send(joined({Bytes(run.head().begin(), run.head().end()),
+               Bytes(run.payload().begin(), run.payload().end())}));
+
+  EXPECT_THAT(said_, ElementsAre("delayed", "delayed", "notified"));
+}
+
+TEST_F(LineNoticesTest, FollowAnItemThatIsNotPlainAtOnce) {
+  onItem_ = [this](wire::Item::Reader) { receiver_.sendOne(); };
+
+  send(frameOf({[](wire::Item::Builder item) { item.setClose(3); }, request(4, 0)}));
+
+  EXPECT_THAT(said_, ElementsAre("(close = 3)", "notified"));
+}
+
 TEST_F(LineNoticesTest, AreGivenAfterAProtocolError) {
   onItem_ = [this](wire::Item::Reader) {
     receiver_.sendOne();
