@@ -38,8 +38,8 @@ class SharedProcessor {
       keeps_ = lastKeeps_ = std::min(2 * lastKeeps_ + kFirstKeeps, kMaxKeeps);
     }
   }
-  // A wait has found an event without a yield: polling is useful, usually because the sender runs on
-  // another processor.
+  // A wait has found an event without a yield: polling is useful, usually because the sender runs
+  // on another processor.
   void notePolled() noexcept { emptyYields_ = 0; }
 
  private:
