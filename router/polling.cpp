@@ -22,12 +22,15 @@ void Polling::noteTraffic() {
   if (idleTurns_ >= kTurnsOfWait || !isPolling_) budget_.noteWait(nowNs - lastTrafficNs_);
   lastTrafficNs_ = nowNs;
   idleTurns_ = 0;
-  if (!std::exchange(isPolling_, true)) tasks_.add(nextTurn());
+  if (isPolling_ || processor_.plan() == SharedProcessor::Plan::keep) return;
+  isPolling_ = true;
+  tasks_.add(nextTurn());
 }
 
 void Polling::add(Polled& window) {
   noteTraffic();
-  if (isReplacing_) return;  // the last look at a window: from now on it wakes the event loop
+  // After the last look at a window it wakes the event loop.
+  if (!isPolling_ || isReplacing_) return;
   if (!windows_.empty() && windows_.back() == &window) return;
   if (const auto found = std::ranges::find(windows_, &window); found != windows_.end()) {
     std::rotate(found, found + 1, windows_.end());
@@ -58,15 +61,23 @@ kj::Promise<void> Polling::nextTurn() {
 }
 
 kj::Promise<void> Polling::loop() {
-  if (Clock::nowNs() - lastTrafficNs_ >= budget_.ns()) {
+  const auto nowNs = Clock::nowNs();
+  if (nowNs - lastTrafficNs_ >= budget_.ns() || !tryYield(nowNs)) {
     end();
     return kj::READY_NOW;
   }
-  ++idleTurns_;
-  ::sched_yield();
   // A window may be added or removed by the call.
   for (std::size_t at = 0; at < windows_.size(); ++at) windows_[at]->poll();
   return nextTurn();
+}
+
+// Returns false if others use the processor for long: then a wake-up is earlier than the next turn.
+bool Polling::tryYield(std::int64_t nowNs) {
+  ++idleTurns_;
+  ::sched_yield();
+  const auto yieldNs = Clock::nowNs() - nowNs;
+  processor_.noteYield(yieldNs, true);
+  return !SharedProcessor::isLong(yieldNs);
 }
 
 // The last look at the windows may start to poll them again, or remove others.

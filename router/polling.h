@@ -6,7 +6,9 @@
 //
 // While it polls, it looks at the descriptors of the event loop, and into the rings of the windows
 // that were busy lately: their clients and servers need no system call to hand a message over. It
-// gives up the processor in each turn: clients and servers on the same processor run first.
+// gives up the processor in each turn: clients and servers on the same processor run first. If
+// others then use it for long, the router sleeps, and does not poll after the next bursts of
+// traffic (SharedProcessor).
 //
 // Threads  that of the event loop.
 #pragma once
@@ -17,6 +19,7 @@
 
 #include "router/fatal_tasks.h"
 #include "router/poll_budget.h"
+#include "shm/shared_processor.h"
 
 namespace mpf::router {
 
@@ -50,11 +53,13 @@ class Polling {
  private:
   kj::Promise<void> nextTurn();
   kj::Promise<void> loop();
+  bool tryYield(std::int64_t nowNs);
   void end();
   static void drop(Polled& window);
 
   kj::UnixEventPort& port_;
   PollBudget budget_;
+  SharedProcessor processor_;
   std::int64_t lastTrafficNs_ = 0;
   std::uint32_t idleTurns_ = 0;  // of the loop, since the last traffic
   bool isPolling_ = false;

@@ -28,11 +28,13 @@ class SharedProcessor {
     const bool isUseless = emptyYields_ == kMaxEmptyYields;
     return isUseless && ++uselessWaits_ % kYieldEvery != 0 ? Plan::sleep : Plan::yield;
   }
+  // Whether a yield of this duration shows that another program uses the processor.
+  [[nodiscard]] static bool isLong(std::int64_t ns) noexcept { return ns >= kLongYieldNs; }
   // Records a yield of this duration. `hasEvents`: there was an event after it.
   void noteYield(std::int64_t ns, bool hasEvents) noexcept {
     if (hasEvents || ns < kOthersRanNs) emptyYields_ = 0;
     else if (ns < kStreamNs) emptyYields_ = std::min(emptyYields_ + 1, kMaxEmptyYields);
-    if (ns < kLongYieldNs) {
+    if (!isLong(ns)) {
       lastKeeps_ -= (lastKeeps_ + kForgetting - 1) / kForgetting;
     } else {
       keeps_ = lastKeeps_ = std::min(2 * lastKeeps_ + kFirstKeeps, kMaxKeeps);

@@ -9,12 +9,27 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/replaced_yield.h"
 #include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
 
 using router::Polling;
+
+struct Window final : router::Polled {
+  void poll() override {
+    ++polls;
+    pollsSinceChange++;
+  }
+  void setPolled(bool polled) override {
+    isPolled = polled;
+    pollsSinceChange = 0;
+  }
+  int polls = 0;
+  int pollsSinceChange = 0;
+  bool isPolled = false;
+};
 
 class PollingTest : public testing::Test {
  public:
@@ -35,8 +50,22 @@ TEST_F(PollingTest, EndsAWhileAfterTheLastTraffic) {
 
   EXPECT_TRUE(polling_.isPolling());
   while (polling_.isPolling()) wait();
+  while (!polling_.isPolling()) polling_.noteTraffic();  // at once, unless a yield was long
+}
+
+TEST_F(PollingTest, SleepsForSomeTrafficWhenOthersUseTheProcessor) {
+  Window window;
+  const std::function<void()> yield = [] { othersRun(std::chrono::milliseconds(2)); };
+  const ReplacedYield replaced(yield);
   polling_.noteTraffic();
-  EXPECT_TRUE(polling_.isPolling()) << "again";
+  while (polling_.isPolling()) wait();
+
+  polling_.add(window);
+
+  EXPECT_FALSE(polling_.isPolling());
+  EXPECT_FALSE(window.isPolled);
+  while (!window.isPolled) polling_.add(window);
+  while (polling_.isPolling()) wait();
 }
 
 TEST_F(PollingTest, HandlesEventsOfDescriptors) {
@@ -75,20 +104,6 @@ TEST_F(PollingTest, RunsTheTasksThatWaitedWhenItBegan) {
 
   EXPECT_EQ(pollsBefore, 0);
 }
-
-struct Window final : router::Polled {
-  void poll() override {
-    ++polls;
-    pollsSinceChange++;
-  }
-  void setPolled(bool polled) override {
-    isPolled = polled;
-    pollsSinceChange = 0;
-  }
-  int polls = 0;
-  int pollsSinceChange = 0;
-  bool isPolled = false;
-};
 
 TEST_F(PollingTest, PollsAWindowUntilItSleepsAndOnceMore) {
   Window window;
