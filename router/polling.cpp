@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <kj/common.h>
-#include <utility>
 
 #include <mpf/clock.h>
 
@@ -76,7 +75,7 @@ bool Polling::tryYield(std::int64_t nowNs) {
   ++idleTurns_;
   ::sched_yield();
   const auto yieldNs = Clock::nowNs() - nowNs;
-  processor_.noteYield(yieldNs, true);
+  processor_.noteYield(yieldNs, true);  // the budget ends empty ones
   return !SharedProcessor::isLong(yieldNs);
 }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // NoticeBatch: delays the notices of its thread. Consecutive messages on one link cause one notice,
 // after the last of them, or before, if there are many. Otherwise the first notice would wake a
-// receiver on the same processor, which preempts the sender, takes one message and sleeps again,
-// several times in a run.
+// receiver on the same processor, which would compete with the sender for the rest of the run.
 //
 // Threads  used by the thread that made it, which has no other batch at that time.
 #pragma once

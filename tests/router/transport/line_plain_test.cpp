@@ -131,7 +131,6 @@ TEST_F(LineNoticesTest, PrecedeTheItemsOfAnotherClient) {
     item.client = client;
     run.append(item);
   }
-  onPlain_ = nullptr;
   run.buildHead();
 
   send(joined({Bytes(run.head().begin(), run.head().end()),
