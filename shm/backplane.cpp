@@ -40,10 +40,11 @@ std::string environmentOr(const char* variable, const char* otherwise) {
   return value != nullptr && *value != '\0' ? value : otherwise;
 }
 
-// Number of files that attach() examines. If a backplane has no more files than this, attach()
-// removes all files of dead processes; otherwise it examines a random choice. `mpf clean` always
-// examines all files.
-constexpr std::size_t kMaxFilesPerAttach = 4096;
+// Number of files that attach() examines, which limits its time. If a backplane has no more files
+// than this, attach() removes all files of dead processes; otherwise it examines a random choice,
+// which is many times what a process makes, so that few of them remain. `mpf clean` always examines
+// all files.
+constexpr std::size_t kMaxFilesPerAttach = 1024;
 
 std::vector<std::string> removeAll(std::vector<stale_segments::Judged> judged) {
   MPF_STEP(stale_scan_begun);

@@ -12,7 +12,6 @@
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
-#include <mutex>
 #include <string_view>
 
 namespace mpf {
@@ -34,16 +33,21 @@ std::uint64_t startTicksIn(const char* path) {
   return ticks;
 }
 
-// Start time of a process. Returns 0 if it cannot be read, or if /proc belongs to another pid
-// namespace.
+// Start time of a process as /proc shows it, which may belong to another pid namespace. Returns 0
+// if it cannot be read.
 std::uint64_t startTicksOf(std::int32_t pid) {
+  std::array<char, 32> path{};
+  std::snprintf(path.data(), path.size(), "/proc/%d/stat", pid);
+  return startTicksIn(path.data());
+}
+
+// Whether /proc shows the processes of our pid namespace.
+bool isProcOurs() noexcept {
   std::array<char, 32> text{};
   std::int32_t self = 0;
   if (const auto length = ::readlink("/proc/self", text.data(), text.size() - 1); length > 0)
     std::from_chars(text.data(), text.data() + length, self);
-  if (self != ::getpid()) return 0;
-  std::snprintf(text.data(), text.size(), "/proc/%d/stat", pid);
-  return startTicksIn(text.data());
+  return self == ::getpid();
 }
 
 std::uint64_t ownPidNamespace() {
@@ -54,7 +58,7 @@ std::uint64_t ownPidNamespace() {
 // Whether a header names a process of our pid namespace.
 bool isNamed(const layout::SegmentHeader& header) {
   return header.ownerPid > 0 && header.ownerStartTicks != 0 &&
-         header.pidNamespace == ownPidNamespace();
+         header.pidNamespace == Process::self().pidNamespace;
 }
 
 constexpr std::uint64_t kEmulatorTicks = 100;  // one second
@@ -76,10 +80,9 @@ FileDescriptor openProcess(std::int32_t pid) {
 
 }  // namespace
 
-Process Process::self() {
-  static std::mutex mutex;
-  static Process self;
-  const std::lock_guard lock(mutex);
+const Process& Process::self() {
+  // Not under a lock: another thread may hold it during a fork, and the child would wait for it.
+  thread_local Process self;
   if (self.pid == ::getpid()) return self;
   self.pid = ::getpid();
   self.uid = ::getuid();
@@ -119,7 +122,8 @@ bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
   const auto ticks = startTicksOf(header.ownerPid);
   // A process that reuses the pid has a later start time. The tolerance is for emulators: qemu
   // shows its program a start time that differs from the one in /proc.
-  return ticks > header.ownerStartTicks + kEmulatorTicks && sharesOurClock(header.ownerPid);
+  return ticks > header.ownerStartTicks + kEmulatorTicks && isProcOurs() &&
+         sharesOurClock(header.ownerPid);
 }
 
 }  // namespace mpf

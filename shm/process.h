@@ -22,8 +22,8 @@ struct Process {
   std::uint64_t pidNamespace{};  // inode
   std::string program;
 
-  // This process. Read once, and again after a fork.
-  static Process self();
+  // This process. Each thread reads it once, and again after a fork.
+  static const Process& self();
   // Writes this process into the header as the owner.
   void describe(layout::SegmentHeader& header) const;
 

@@ -283,6 +283,14 @@ std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name,
   return header;
 }
 
+std::optional<Probed> tryProbe(const std::string& name, layout::SegmentKind kind) {
+  Probed probed{};
+  const auto file = openChecked(name, kind, O_RDONLY, probed.header);
+  if (!file) return std::nullopt;
+  probed.hasOwner = owner_lock::isHeldByOwner(file.get(), probed.header);
+  return probed;
+}
+
 Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
   const auto file = openByName(name, O_RDONLY);
   // A file that we cannot open may have a living owner.

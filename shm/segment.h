@@ -129,6 +129,14 @@ enum class Owner { alive, dead, absent };
 // process that the header names has not ended, as far as this process can find out. With an
 // incarnation: `absent` also if a window of another incarnation has the name now.
 [[nodiscard]] Owner probeOwner(const std::string& name, std::uint64_t incarnation = 0);
+// The header of a window, and whether its owner is alive, both of the same file; nullopt if no file
+// has this name.
+//   throws  as Segment::tryOpen
+struct Probed {
+  layout::SegmentHeader header;
+  bool hasOwner;
+};
+std::optional<Probed> tryProbe(const std::string& name, layout::SegmentKind kind);
 // Whether both files exist and belong to the same user.
 [[nodiscard]] bool haveSameUser(const std::string& one, const std::string& other);
 // Whether any process holds a write lock on the byte of the owner's lock.

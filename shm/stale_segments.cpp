@@ -45,21 +45,15 @@ Finding judgeKeyed(const std::string& name) {
 // For a window. A free lock proves nothing unless the file is a segment of a known version, or its
 // name contains an incarnation.
 Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
-  const auto header = segments::tryReadHeader(name, kind);
-  if (!header) return {Verdict::dead, "its name no longer exists"};
-  switch (segments::probeOwner(name, header->incarnation)) {
-    case segments::Owner::alive:
-      return {Verdict::alive, fmt::format("{} holds the lock of {}", ownerText(*header), name)};
-    case segments::Owner::dead:
-      if (segments::isLocked(name))
-        return {Verdict::dead, fmt::format("{} has ended; another process holds a lock on {}",
-                                           ownerText(*header), name)};
-      return {Verdict::dead,
-              fmt::format("no process holds the lock of {}; {} did", name, ownerText(*header))};
-    case segments::Owner::absent:
-      break;
-  }
-  return {Verdict::unknown, "another segment has just replaced it"};
+  const auto window = segments::tryProbe(name, kind);
+  if (!window) return {Verdict::dead, "its name no longer exists"};
+  const auto owner = ownerText(window->header);
+  if (window->hasOwner)
+    return {Verdict::alive, fmt::format("{} holds the lock of {}", owner, name)};
+  if (segments::isLocked(name))
+    return {Verdict::dead,
+            fmt::format("{} has ended; another process holds a lock on {}", owner, name)};
+  return {Verdict::dead, fmt::format("no process holds the lock of {}; {} did", name, owner)};
 } catch (const VersionError& error) {
   return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
 } catch (const SegmentError& error) {
@@ -76,12 +70,18 @@ class Judge {
       : backplane_(std::move(backplane)), names_(std::move(names)), isChoice_(isChoice) {}
 
   std::vector<Judged> run() {
+    std::vector<std::pair<std::string, Parsed>> files;
+    std::vector<std::string> others;
+    for (auto& name : names_) {
+      auto parsed = SegmentName::tryParse(name);
+      if (parsed) files.emplace_back(std::move(name), *std::move(parsed));
+      else others.push_back(std::move(name));
+    }
     for (const auto step : {&Judge::withLock, &Judge::hints, &Judge::ofWindow, &Judge::last}) {
-      for (const auto& name : names_) {
-        if (const auto parsed = SegmentName::tryParse(name)) (this->*step)(name, *parsed);
-        else if (step == &Judge::last && !isChoice_)
-          add(name, {Verdict::unknown, "not a name that MPF gives"});
-      }
+      for (const auto& [name, parsed] : files) (this->*step)(name, parsed);
+    }
+    for (const auto& name : others) {
+      if (!isChoice_) add(name, {Verdict::unknown, "not a name that MPF gives"});
     }
     return std::move(judged_);
   }

@@ -57,17 +57,17 @@ class BackplaneTest : public ShmTest {
   }
 };
 
-// attach() examines up to 4096 files. With more files, it must not wait for the names that other
+// attach() examines up to 1024 files. With more files, it must not wait for the names that other
 // users created.
 TEST_F(BackplaneTest, AttachExaminesOnlySomeOfVeryManyFiles) {
-  for (std::uint64_t number = 1; number <= 5000; ++number) {
+  for (std::uint64_t number = 1; number <= 1500; ++number) {
     std::ofstream{segments::path(SegmentName::keyed(name(), NameKind::pendingBind, number))};
   }
 
   Backplane::attach(name());
 
-  EXPECT_EQ(backplane_.segmentNames().size(), 5000U - 4096U);
-  EXPECT_EQ(backplane_.removeDead().size(), 5000U - 4096U);
+  EXPECT_EQ(backplane_.segmentNames().size(), 1500U - 1024U);
+  EXPECT_EQ(backplane_.removeDead().size(), 1500U - 1024U);
 }
 
 TEST_F(BackplaneTest, TakesItsNameFromTheCallerTheEnvironmentOrTheDefault) {
