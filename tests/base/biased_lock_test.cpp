@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-// This file replaces sched_yield(), which a thread calls that waits for a lock, with a function
-// that counts.
 #include "base/biased_lock.h"
 
 #include <sys/syscall.h>
@@ -11,16 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace {
-
-thread_local std::atomic<int>* yieldsOfThisThread = nullptr;
-
-}  // namespace
-
-extern "C" int sched_yield() noexcept {
-  if (yieldsOfThisThread != nullptr) ++*yieldsOfThisThread;
-  return static_cast<int>(::syscall(SYS_sched_yield));
-}
+#include "tests/support/replaced_yield.h"
 
 namespace mpf {
 namespace {
@@ -62,7 +51,10 @@ TEST(BiasedLockTest, AnotherThreadWaitsForTheOwner) {
   {
     const BiasedLock::Guard guard(lock);
     other = std::thread([&] {
-      yieldsOfThisThread = &yields;
+      const test::ReplacedYield counted([&] {
+        ++yields;
+        ::syscall(SYS_sched_yield);
+      });
       const BiasedLock::Guard mine(lock);
       hasEntered = true;
       EXPECT_FALSE(isHeld);

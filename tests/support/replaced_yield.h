@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <functional>
+#include <utility>
 
 #include <mpf/clock.h>
 
@@ -14,12 +15,17 @@ namespace mpf::test {
 
 class ReplacedYield {
  public:
-  explicit ReplacedYield(const std::function<void()>& instead) noexcept { current = &instead; }
+  explicit ReplacedYield(std::function<void()> instead) : instead_(std::move(instead)) {
+    current = &instead_;
+  }
   ~ReplacedYield() { current = nullptr; }
   ReplacedYield(const ReplacedYield&) = delete;
   ReplacedYield& operator=(const ReplacedYield&) = delete;
 
   static inline thread_local const std::function<void()>* current = nullptr;
+
+ private:
+  std::function<void()> instead_;
 };
 
 // Others use the processor for this time.
