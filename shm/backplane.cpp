@@ -41,8 +41,8 @@ std::string environmentOr(const char* variable, const char* otherwise) {
 }
 
 // Number of files that attach() examines, which limits its time. If a backplane has no more files
-// than this, attach() removes all files of dead processes; otherwise it examines a random choice,
-// which is many times what a process makes, so that few of them remain. `mpf clean` always examines
+// than this, attach() removes all files of dead processes; otherwise it examines a random choice of
+// them (docs/decisions/0038-short-attach.md says why this is enough). `mpf clean` always examines
 // all files.
 constexpr std::size_t kMaxFilesPerAttach = 1024;
 

@@ -14,6 +14,8 @@
 #include <cstdio>
 #include <string_view>
 
+#include "shm/fork_guard.h"
+
 namespace mpf {
 namespace {
 
@@ -78,33 +80,48 @@ FileDescriptor openProcess(std::int32_t pid) {
   return FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
 }
 
+// Whether the process that a header names, one of our pid namespace, has ended.
+bool isGone(const layout::SegmentHeader& header) noexcept {
+  const auto process = openProcess(header.ownerPid);
+  if (!process) return errno == ESRCH;
+  if (Process::hasEnded(process)) return true;
+  const auto ticks = startTicksOf(header.ownerPid);
+  // A process that reuses the pid has a later start time. The tolerance is for emulators: qemu
+  // shows its program a start time that differs from the one in /proc.
+  return ticks > header.ownerStartTicks + kEmulatorTicks && isProcOurs() &&
+         sharesOurClock(header.ownerPid);
+}
+
 }  // namespace
 
-const Process& Process::self() {
+const Process& Process::self() noexcept {
   // Not under a lock: another thread may hold it during a fork, and the child would wait for it.
+  thread_local ForkGuard fork;
   thread_local Process self;
-  if (self.pid == ::getpid()) return self;
-  self.pid = ::getpid();
-  self.uid = ::getuid();
-  self.startTicks = startTicksIn("/proc/self/stat");
-  self.pidNamespace = ownPidNamespace();
-  self.program = ::program_invocation_short_name;
+  const bool isKnown = self.pid == ::getpid() && !fork.isInherited() && self.startTicks != 0 &&
+                       self.pidNamespace != 0;  // 0: /proc could not be read
+  if (isKnown) return self;
+  fork = ForkGuard();
+  self = {::getpid(), ::getuid(), startTicksIn("/proc/self/stat"), ownPidNamespace(), {}};
+  const std::string_view name = ::program_invocation_short_name;
+  name.copy(self.program.data(), self.program.size() - 1);
   return self;
 }
 
-void Process::describe(layout::SegmentHeader& header) const {
+void Process::describe(layout::SegmentHeader& header) const noexcept {
   header.ownerPid = pid;
   header.ownerUid = uid;
   header.ownerStartTicks = startTicks;
   header.pidNamespace = pidNamespace;
-  program.copy(header.program.data(), header.program.size() - 1);
+  header.program = program;
 }
 
 FileDescriptor Process::openOwner(const layout::SegmentHeader& header) {
   if (!isNamed(header)) return {};
   auto descriptor = openProcess(header.ownerPid);
   // Checked after the open: if the start time matches now, the descriptor refers to the owner.
-  if (descriptor && startTicksOf(header.ownerPid) != header.ownerStartTicks) descriptor.reset();
+  if (descriptor && (startTicksOf(header.ownerPid) != header.ownerStartTicks || !isProcOurs()))
+    descriptor.reset();
   return descriptor;
 }
 
@@ -114,16 +131,10 @@ bool Process::hasEnded(const FileDescriptor& process) noexcept {
   return ::poll(&ended, 1, 0) == 1 && (ended.revents & POLLIN) != 0;
 }
 
+// Does not rely on the namespace in self(): the child of a clone() that runs no handler of a fork
+// may have the pid of its parent, in another namespace.
 bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
-  if (!isNamed(header)) return false;
-  const auto descriptor = openProcess(header.ownerPid);
-  if (!descriptor) return errno == ESRCH;
-  if (hasEnded(descriptor)) return true;
-  const auto ticks = startTicksOf(header.ownerPid);
-  // A process that reuses the pid has a later start time. The tolerance is for emulators: qemu
-  // shows its program a start time that differs from the one in /proc.
-  return ticks > header.ownerStartTicks + kEmulatorTicks && isProcOurs() &&
-         sharesOurClock(header.ownerPid);
+  return isNamed(header) && isGone(header) && header.pidNamespace == ownPidNamespace();
 }
 
 }  // namespace mpf

@@ -6,8 +6,8 @@
 // Trust    another process may write the header; the answers are about the process that it names.
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <string>
 
 #include <mpf/file_descriptor.h>
 
@@ -20,12 +20,13 @@ struct Process {
   std::uint32_t uid{};
   std::uint64_t startTicks{};    // start time since boot; with the pid it identifies a process
   std::uint64_t pidNamespace{};  // inode
-  std::string program;
+  std::array<char, layout::kProgramChars> program{};  // ends with a null character
 
-  // This process. Each thread reads it once, and again after a fork.
-  static const Process& self();
+  // This process. Each thread reads it once, and again after a fork. It has no destructor, so
+  // static objects may use it while they are destroyed.
+  static const Process& self() noexcept;
   // Writes this process into the header as the owner.
-  void describe(layout::SegmentHeader& header) const;
+  void describe(layout::SegmentHeader& header) const noexcept;
 
   // A descriptor that becomes readable when the owner in `header` ends. Empty if the owner has
   // ended already, is in another pid namespace, or another process has its pid now.

@@ -287,8 +287,18 @@ std::optional<Probed> tryProbe(const std::string& name, layout::SegmentKind kind
   Probed probed{};
   const auto file = openChecked(name, kind, O_RDONLY, probed.header);
   if (!file) return std::nullopt;
-  probed.hasOwner = owner_lock::isHeldByOwner(file.get(), probed.header);
+  struct stat status{};
+  checkCall(::fstat(file.get(), &status), "read the status of", path(name));
+  probed.user = status.st_uid;
+  probed.isLocked = owner_lock::isHeld(file.get());
+  probed.hasOwner = probed.isLocked && !Process::hasEnded(probed.header);
   return probed;
+}
+
+std::optional<std::uint32_t> userOf(const std::string& name) {
+  struct stat status{};
+  if (::lstat(path(name).c_str(), &status) != 0) return std::nullopt;
+  return status.st_uid;
 }
 
 Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
@@ -305,10 +315,8 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
 }
 
 bool haveSameUser(const std::string& one, const std::string& other) {
-  struct stat first{};
-  struct stat second{};
-  return ::lstat(path(one).c_str(), &first) == 0 && ::lstat(path(other).c_str(), &second) == 0 &&
-         first.st_uid == second.st_uid;
+  const auto user = userOf(one);
+  return user && user == userOf(other);
 }
 
 bool isLocked(const std::string& name) {

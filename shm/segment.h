@@ -129,14 +129,18 @@ enum class Owner { alive, dead, absent };
 // process that the header names has not ended, as far as this process can find out. With an
 // incarnation: `absent` also if a window of another incarnation has the name now.
 [[nodiscard]] Owner probeOwner(const std::string& name, std::uint64_t incarnation = 0);
-// The header of a window, and whether its owner is alive, both of the same file; nullopt if no file
-// has this name.
-//   throws  as Segment::tryOpen
+// What one look at a window has found.
 struct Probed {
   layout::SegmentHeader header;
-  bool hasOwner;
+  std::uint32_t user;  // owner of the file
+  bool isLocked;  // a process holds the owner's lock
+  bool hasOwner;  // as probeOwner()
 };
+// Looks at a window; nullopt if no file has this name.
+//   throws  as Segment::tryOpen
 std::optional<Probed> tryProbe(const std::string& name, layout::SegmentKind kind);
+// The user that owns a file; nullopt if no file has this name.
+[[nodiscard]] std::optional<std::uint32_t> userOf(const std::string& name);
 // Whether both files exist and belong to the same user.
 [[nodiscard]] bool haveSameUser(const std::string& one, const std::string& other);
 // Whether any process holds a write lock on the byte of the owner's lock.

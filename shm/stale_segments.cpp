@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <fmt/format.h>
-#include <iterator>
+#include <limits>
 #include <map>
+#include <optional>
 #include <random>
+#include <set>
 
 #include "base/step.h"
 #include "shm/owner_lock.h"
@@ -44,13 +46,15 @@ Finding judgeKeyed(const std::string& name) {
 
 // For a window. A free lock proves nothing unless the file is a segment of a known version, or its
 // name contains an incarnation.
-Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
-  const auto window = segments::tryProbe(name, kind);
+//   window  what was found, if the file is a window of a known version
+Finding judgeWindow(const std::string& name, layout::SegmentKind kind,
+                    std::optional<segments::Probed>& window) try {
+  window = segments::tryProbe(name, kind);
   if (!window) return {Verdict::dead, "its name no longer exists"};
   const auto owner = ownerText(window->header);
   if (window->hasOwner)
     return {Verdict::alive, fmt::format("{} holds the lock of {}", owner, name)};
-  if (segments::isLocked(name))
+  if (window->isLocked)
     return {Verdict::dead,
             fmt::format("{} has ended; another process holds a lock on {}", owner, name)};
   return {Verdict::dead, fmt::format("no process holds the lock of {}; {} did", name, owner)};
@@ -65,55 +69,67 @@ Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
 
 class Judge {
  public:
-  //   isChoice  `names` are only some of the names of the backplane
-  Judge(std::string backplane, std::vector<std::string> names, bool isChoice)
-      : backplane_(std::move(backplane)), names_(std::move(names)), isChoice_(isChoice) {}
+  //   most   judges so many files, chosen at random, if there are more
+  Judge(std::string backplane, std::size_t most) : backplane_(std::move(backplane)), most_(most) {}
 
   std::vector<Judged> run() {
-    std::vector<std::pair<std::string, Parsed>> files;
+    std::vector<File> files;
     std::vector<std::string> others;
-    for (auto& name : names_) {
+    for (auto& name : segments::list(SegmentName::prefix(backplane_))) {
       auto parsed = SegmentName::tryParse(name);
-      if (parsed) files.emplace_back(std::move(name), *std::move(parsed));
-      else others.push_back(std::move(name));
+      if (!parsed) {
+        others.push_back(std::move(name));
+        continue;
+      }
+      if (parsed->kind == NameKind::link) listedLinks_.insert(parsed->incarnation);
+      files.emplace_back(std::move(name), *std::move(parsed));
     }
+    const bool isChoice = files.size() + others.size() > most_;
+    if (files.size() > most_) choose(files);
     for (const auto step : {&Judge::withLock, &Judge::hints, &Judge::ofWindow, &Judge::last}) {
       for (const auto& [name, parsed] : files) (this->*step)(name, parsed);
     }
     for (const auto& name : others) {
-      if (!isChoice_) add(name, {Verdict::unknown, "not a name that MPF gives"});
+      if (!isChoice) add(name, {Verdict::unknown, "not a name that MPF gives"});
     }
     return std::move(judged_);
   }
 
  private:
   using Parsed = SegmentName::Parsed;
+  using File = std::pair<std::string, Parsed>;
+  struct DeadWindow {
+    std::string name;
+    std::optional<std::uint32_t> user;  // that owned its file
+  };
+
+  void choose(std::vector<File>& files) const {
+    std::ranges::shuffle(files, std::minstd_rand(std::random_device()()));
+    files.erase(files.begin() + static_cast<std::ptrdiff_t>(most_), files.end());
+  }
 
   void add(const std::string& name, Finding finding) {
     judged_.push_back({name, finding.verdict, std::move(finding.reason)});
   }
 
   void withLock(const std::string& name, const Parsed& parsed) {
+    std::optional<segments::Probed> window;
     if (parsed.kind == NameKind::serverWindow) {
-      auto finding = judgeWindow(name, layout::SegmentKind::serverWindow);
-      if (finding.verdict == Verdict::dead) noteDead(name, layout::SegmentKind::serverWindow);
+      auto finding = judgeWindow(name, layout::SegmentKind::serverWindow, window);
+      if (finding.verdict == Verdict::dead && window)
+        deadWindows_.emplace(window->header.incarnation, DeadWindow{name, window->user});
       add(name, std::move(finding));
     } else if (parsed.kind == NameKind::clientWindow) {
       const auto& finding = clients_[parsed.incarnation] =
-          judgeWindow(name, layout::SegmentKind::clientWindow);
-      if (finding.verdict == Verdict::dead) deadWindows_.emplace(parsed.incarnation, name);
+          judgeWindow(name, layout::SegmentKind::clientWindow, window);
+      if (finding.verdict == Verdict::dead) {
+        const auto user = window ? window->user : segments::userOf(name);
+        deadWindows_.emplace(parsed.incarnation, DeadWindow{name, user});
+      }
       add(name, finding);
     } else if (parsed.kind == NameKind::router || parsed.kind == NameKind::reaper) {
       add(name, judgeKeyed(name));
     }
-  }
-
-  // Remembers a dead server window by its incarnation.
-  void noteDead(const std::string& name, layout::SegmentKind kind) try {
-    if (const auto header = segments::tryReadHeader(name, kind))
-      deadWindows_.emplace(header->incarnation, name);
-    // NOLINTNEXTLINE(bugprone-empty-catch): removed or replaced: it says nothing about the hints
-  } catch (const std::exception&) {
   }
 
   void hints(const std::string& name, const Parsed& parsed) {
@@ -126,11 +142,10 @@ class Judge {
   // incarnation of these hints.
   Finding judgeHints(const std::string& name, std::uint64_t incarnation) const {
     const auto [first, last] = deadWindows_.equal_range(incarnation);
-    const auto isTheirs = [&](const auto& window) {
-      return segments::haveSameUser(window.second, name);
-    };
+    const auto user = first == last ? std::nullopt : segments::userOf(name);
+    const auto isTheirs = [&](const auto& window) { return user && window.second.user == user; };
     if (const auto window = std::find_if(first, last, isTheirs); window != last)
-      return {Verdict::dead, fmt::format("the owner of {} is dead", window->second)};
+      return {Verdict::dead, fmt::format("the owner of {} is dead", window->second.name)};
     return judgeKeyed(name);
   }
 
@@ -155,13 +170,13 @@ class Judge {
   }
 
   // A pool belongs to its link; a FIFO and the fan-out pool to a window, whose hints were judged.
+  // A pool whose link exists, but was not chosen, is not judged.
   void last(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::bulk) {
-      const auto link = links_.find(parsed.incarnation);
-      if (link == links_.end() && isChoice_) return;
-      add(name, link == links_.end() ? Finding{Verdict::dead, fmt::format("its link {:x} is gone",
-                                                                          parsed.incarnation)}
-                                     : link->second);
+      if (const auto link = links_.find(parsed.incarnation); link != links_.end())
+        add(name, link->second);
+      else if (!listedLinks_.contains(parsed.incarnation))
+        add(name, {Verdict::dead, fmt::format("its link {:x} is gone", parsed.incarnation)});
     } else if (parsed.kind == NameKind::fifo || parsed.kind == NameKind::fanOut) {
       add(name, ownerOf(hints_, NameKind::hints, parsed.incarnation));
     }
@@ -176,18 +191,18 @@ class Judge {
     const auto name = SegmentName::keyed(backplane_, kind, incarnation);
     found->second = {Verdict::dead, fmt::format("its owner's {} is gone", name)};
     for (const auto& lock : {name, SegmentName::keyed(backplane_, NameKind::hints, incarnation)}) {
-      if (segments::probeOwner(lock) == segments::Owner::alive)
-        found->second = {Verdict::alive, fmt::format("the lock of {} is held", lock)};
+      if (segments::probeOwner(lock) != segments::Owner::alive) continue;
+      found->second = {Verdict::alive, fmt::format("the lock of {} is held", lock)};
+      break;
     }
     return found->second;
   }
 
   std::string backplane_;
-  std::vector<std::string> names_;
-  bool isChoice_;
+  std::size_t most_;
+  std::set<std::uint64_t> listedLinks_;  // also those that were not chosen
   std::map<std::uint64_t, Finding> clients_;  // by the incarnation of the window
-  // names of dead windows, by the incarnation of the window
-  std::multimap<std::uint64_t, std::string> deadWindows_;
+  std::multimap<std::uint64_t, DeadWindow> deadWindows_;  // likewise
   std::map<std::uint64_t, Finding> hints_;
   std::map<std::uint64_t, Finding> links_;
   std::vector<Judged> judged_;
@@ -196,16 +211,11 @@ class Judge {
 }  // namespace
 
 std::vector<Judged> judge(const std::string& backplane) {
-  return Judge(backplane, segments::list(SegmentName::prefix(backplane)), false).run();
+  return judgeSome(backplane, std::numeric_limits<std::size_t>::max());
 }
 
 std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most) {
-  auto names = segments::list(SegmentName::prefix(backplane));
-  if (names.size() <= most) return Judge(backplane, std::move(names), false).run();
-  std::vector<std::string> chosen;
-  std::ranges::sample(names, std::back_inserter(chosen), static_cast<std::ptrdiff_t>(most),
-                      std::minstd_rand(std::random_device()()));
-  return Judge(backplane, std::move(chosen), true).run();
+  return Judge(backplane, most).run();
 }
 
 bool tryRemove(const Judged& file) {

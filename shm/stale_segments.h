@@ -31,7 +31,7 @@ std::vector<Judged> judge(const std::string& backplane);
 
 // As judge(), but if there are more than `most` files, judges `most` of them, chosen at random. Any
 // user may fill /dev/shm with names, and a process that attaches must not wait for all of them. The
-// choice omits names that MPF does not give, and pools whose link was not chosen.
+// choice omits names that MPF does not give, and pools whose link exists but was not chosen.
 std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most);
 
 // Removes a file that was found dead. Returns false if another process has removed it or this user

@@ -27,8 +27,9 @@ class Watcher;  // internal
 
 class Backplane {
  public:
-  // Attaches to the backplane `name`, and removes segments of dead processes. No other process
-  // needs to use this backplane yet.
+  // Attaches to the backplane `name`, and removes segments of dead processes; if the backplane has
+  // more than 1024 files, those of a random choice. No other process needs to use this backplane
+  // yet.
   //   name    1 to 39 of the characters A-Z a-z 0-9 _ -; empty: the environment variable
   //           MPF_BACKPLANE, or "default" if that is not set
   //   throws  std::invalid_argument if the name is invalid, std::system_error if /dev/shm cannot be

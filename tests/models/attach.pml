@@ -13,6 +13,7 @@
 //   HOLDS   no name of a dead client is left once a process has attached after its death and after
 //           all other attachers
 //   ASSUMES a listing that shows a name shows every older name that still exists (true for tmpfs)
+//   ASSUMES an attacher examines all files (it does so up to 1024 of them)
 //   ASSUMES one client with one link, which may be killed before any step; two attachers at any
 //           time, one at the end
 //   BREAK   LIST_LATE    an attacher lists the names of links after it has checked the windows

@@ -30,7 +30,8 @@ TEST_F(ProcessTest, DescribesItselfInAHeader) {
   EXPECT_EQ(header_.ownerPid, ::getpid());
   EXPECT_EQ(header_.ownerUid, ::getuid());
   EXPECT_NE(header_.ownerStartTicks, 0u);
-  EXPECT_EQ(std::string(header_.program.data()), Process::self().program);
+  EXPECT_EQ(header_.program, Process::self().program);
+  EXPECT_STREQ(header_.program.data(), ::program_invocation_short_name);
 }
 
 TEST_F(ProcessTest, ALivingProcessHasNotEnded) {

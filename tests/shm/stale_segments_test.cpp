@@ -187,5 +187,21 @@ TEST_F(StaleSegmentsTest, DoesNotJudgeAPoolWithoutItsLink) {
   segments::remove(bulk);
 }
 
+// A link may be chosen and removed before its pool is chosen.
+TEST_F(StaleSegmentsTest, SomeAtATimeRemoveEveryFileOfADeadProcess) {
+  for (std::uint64_t link = 1; link <= 20; ++link) {
+    leave(SegmentName::link(name(), 1, link), SegmentKind::link, 0x99);
+    leave(SegmentName::bulk(name(), link, 0, 0), SegmentKind::bulk, 0x99);
+  }
+
+  constexpr int kEnough = 1000;
+  for (int round = 0; round < kEnough && !backplane_.segmentNames().empty(); ++round) {
+    for (const auto& file : stale_segments::judgeSome(name(), 4))
+      static_cast<void>(stale_segments::tryRemove(file));
+  }
+
+  EXPECT_TRUE(backplane_.segmentNames().empty());
+}
+
 }  // namespace
 }  // namespace mpf::test
