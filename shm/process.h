@@ -22,8 +22,8 @@ struct Process {
   std::uint64_t pidNamespace{};  // inode
   std::array<char, layout::kProgramChars> program{};  // ends with a null character
 
-  // This process. Each thread reads it once, and again after a fork. It has no destructor, so
-  // static objects may use it while they are destroyed.
+  // This process. Each thread reads it once, and again after a fork. The object has no
+  // destructor, so static objects may use it while they are destroyed.
   static const Process& self() noexcept;
   // Writes this process into the header as the owner.
   void describe(layout::SegmentHeader& header) const noexcept;
