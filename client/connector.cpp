@@ -105,6 +105,7 @@ void Connector::askForAcceptance(Link& link) {
   parts_.endpoint.attach(index_, link);
   setReason(notAcceptedBecause(*link.peer()));
   link.peer()->knock(link.header().incarnation);
+  parts_.endpoint.peers().watchClosely(*link.peer());
 }
 
 void Connector::askAgain(Link& link) {
@@ -134,7 +135,9 @@ void Connector::closeLink(RequestSender& sender) {
   endpoint.detach(index_);
   parts_.linkOwners.set(index_, nullptr);
   count(endpoint.control().linksClosed);
+  auto server = link.peer();
   sender.close();
+  endpoint.peers().release(std::move(server));
 }
 
 // The shortage at the server that keeps it from accepting the client; empty when it reports none.

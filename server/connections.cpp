@@ -95,6 +95,9 @@ void Connections::close(Connection& connection) noexcept {
   channel->link().notifyPeer();
   count(endpoint_.control().linksClosed);
   reportClient(client, false);
+  auto window = channel->link().peer();
+  channel.reset();
+  endpoint_.peers().release(std::move(window));
 }
 
 void Connections::closeIfClientDid(Connection& connection) noexcept {

@@ -17,7 +17,7 @@ PeerWindows::~PeerWindows() {
 
 std::shared_ptr<PeerWindow> PeerWindows::tryOpen(const std::string& name,
                                                  layout::SegmentKind kind) {
-  dropUnused();
+  dropUnused(peers_.begin(), peers_.end());
   const auto [first, last] = peers_.equal_range(name);
   for (auto peer = first; peer != last; ++peer) {
     auto window = peer->second.window.lock();
@@ -26,17 +26,32 @@ std::shared_ptr<PeerWindow> PeerWindows::tryOpen(const std::string& name,
     if (window && !window->isDead() && !window->isClosed() && !window->isLost()) return window;
   }
   auto window = PeerWindow::tryOpen(name, kind);
-  if (!window || window->isClosed() || !window->hasOwner()) return nullptr;
+  if (!window || window->isClosed() || !window->isLocked()) return nullptr;
   const auto clean = [this, name, incarnation = window->header().incarnation] {
     stale_segments::removeDeadWindow(backplane_.name(), name, incarnation);
     onDeath_();
   };
-  peers_.emplace(name, Peer{window, backplane_.watcher().watchPeer(window, clean)});
+  peers_.emplace(name, Peer{window, backplane_.watcher().addPeer(window, clean)});
   return window;
 }
 
-void PeerWindows::dropUnused() noexcept {
-  for (auto peer = peers_.begin(); peer != peers_.end();) {
+void PeerWindows::watchClosely(const PeerWindow& window) noexcept {
+  const auto [first, last] = peers_.equal_range(window.name());
+  for (auto peer = first; peer != last; ++peer) {
+    if (peer->second.window.lock().get() != &window) continue;
+    if (!std::exchange(peer->second.isWatchedClosely, true))
+      backplane_.watcher().watchProcess(peer->second.token);
+  }
+}
+
+void PeerWindows::release(std::shared_ptr<PeerWindow> window) noexcept {
+  const auto [first, last] = peers_.equal_range(window->name());
+  window.reset();
+  dropUnused(first, last);
+}
+
+void PeerWindows::dropUnused(Peers::iterator from, Peers::iterator to) noexcept {
+  for (auto peer = from; peer != to;) {
     if (peer->second.window.use_count() > 1) {  // the watcher holds one reference
       ++peer;
       continue;

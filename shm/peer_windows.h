@@ -28,22 +28,31 @@ class PeerWindows {
   PeerWindows(const PeerWindows&) = delete;
   PeerWindows& operator=(const PeerWindows&) = delete;
 
-  // The window of this name; nullptr if there is no open one whose owner is alive.
-  //   throws  as PeerWindow::tryOpen()
+  // The window of this name; nullptr if there is no open one whose owner holds its lock.
+  //   throws  as PeerWindow::tryOpen() and Watcher::addPeer()
   std::shared_ptr<PeerWindow> tryOpen(const std::string& name, layout::SegmentKind kind);
+  // Lets the death of the owner of a window from tryOpen() be reported at once; until then it is
+  // reported within 100 ms. A step of its own, to be taken while the peer works on the new link,
+  // because it takes about as long as the opening.
+  void watchClosely(const PeerWindow& window) noexcept;
+  // At the end of a link: unmaps the window if this was the last use. Otherwise a later tryOpen()
+  // does.
+  void release(std::shared_ptr<PeerWindow> window) noexcept;
 
  private:
   struct Peer {
     std::weak_ptr<PeerWindow> window;
     Watcher::Token token;
+    bool isWatchedClosely = false;
   };
-  void dropUnused() noexcept;
+  using Peers = std::multimap<std::string, Peer>;
+  void dropUnused(Peers::iterator from, Peers::iterator to) noexcept;
 
   ForkGuard forkGuard_;
   Backplane backplane_;
   std::function<void()> onDeath_;
   // By name: the current window, and older windows of the name whose links have not ended yet.
-  std::multimap<std::string, Peer> peers_;
+  Peers peers_;
 };
 
 }  // namespace mpf

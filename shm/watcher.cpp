@@ -36,11 +36,15 @@ void closeElsewhere(FileDescriptor names) noexcept try {
 } catch (const std::system_error&) {
 }
 
-void add(int epoll, int fd, Watcher::Token token) {
+bool tryAdd(int epoll, int fd, Watcher::Token token) noexcept {
   epoll_event event{};
   event.events = EPOLLIN;
   event.data.u64 = token;
-  checkCall(::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event), "epoll_ctl");
+  return ::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event) == 0;
+}
+
+void add(int epoll, int fd, Watcher::Token token) {
+  if (!tryAdd(epoll, fd, token)) throwSystemError(errno, "epoll_ctl", "");
 }
 
 // The letters of the kinds of new names of the backplane in an inotify buffer; "*" if the queue
@@ -91,15 +95,30 @@ void Watcher::start() {
   });
 }
 
-Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback) {
+Watcher::Token Watcher::addPeer(std::shared_ptr<PeerWindow> peer, Callback callback) {
   const std::lock_guard lock(mutex_);
   start();
   const auto token = next_++;
-  const bool isPolled = !peer->process();
-  if (!isPolled) add(epoll_.get(), peer->process().get(), token);
-  peers_.emplace(token, Peer{std::move(peer), std::move(callback), isPolled});
+  peers_.emplace(token, Peer{std::move(peer), std::move(callback)});
   updateTimer();
-  if (isPolled) pollAtOnce();  // the peer may have died before it was watched
+  return token;
+}
+
+void Watcher::watchProcess(Token token) noexcept {
+  const std::lock_guard lock(mutex_);
+  const auto found = peers_.find(token);
+  if (found == peers_.end()) return;  // reported
+  auto& peer = found->second;
+  peer.window->openProcess();
+  const auto& process = peer.window->process();
+  if (!process || !tryAdd(epoll_.get(), process.get(), token)) return pollAtOnce();
+  peer.isPolled = false;
+  updateTimer();
+}
+
+Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback) {
+  const auto token = addPeer(std::move(peer), std::move(callback));
+  watchProcess(token);
   return token;
 }
 

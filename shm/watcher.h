@@ -6,9 +6,9 @@
 //   new name in /dev/shm ─► callbacks for its kind (clients: servers; routers: pending binds)
 //
 // Threads  any thread may call; callbacks run on the watcher's thread and must not block.
-// Crash    if a peer has no pidfd here (another pid namespace, a reused pid), the watcher checks
-//          its lock every 100 ms. Likewise, it calls the callbacks for names every 100 ms if the
-//          user has no free inotify instance.
+// Crash    as long as a peer has no pidfd here (another pid namespace, a reused pid, no free
+//          descriptor), the watcher checks its lock every 100 ms. Likewise, it calls the callbacks
+//          for names every 100 ms if the user has no free inotify instance.
 // Trust    the pid of a window is from a header that its owner alone writes. Without a pidfd, the
 //          kernel's lock is the proof.
 #pragma once
@@ -38,7 +38,13 @@ class Watcher {
   ~Watcher();
 
   // Calls `callback` once, after the owner of `peer`, which is not watched yet, has died or closed
-  // its window. Then peer->isDead() is true.
+  // its window, possibly before this call: within 100 ms, or at once after watchProcess(). Then
+  // peer->isDead() is true.
+  //   throws  std::system_error: no thread can be started; std::bad_alloc
+  Token addPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
+  // Called once for a peer, by the thread that uses its window.
+  void watchProcess(Token token) noexcept;
+  // Both steps.
   Token watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
   // Calls `callback` each time a segment of this kind may have appeared.
   Token watchNames(NameKind kind, Callback callback);
@@ -50,7 +56,7 @@ class Watcher {
   struct Peer {
     std::shared_ptr<PeerWindow> window;
     Callback callback;
-    bool isPolled = false;  // or its process is in epoll_
+    bool isPolled = true;  // or its process is in epoll_
   };
   void start();
   void run();

@@ -14,7 +14,6 @@
 
 #include "base/expedited_barrier.h"
 #include "base/step.h"
-#include "shm/process.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -181,14 +180,13 @@ std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout:
   auto peer = std::make_shared<PeerWindow>();
   peer->window_ = std::move(*window);
   peer->hints_ = std::move(*hints);
-  peer->process_ = Process::openOwner(peer->header());
   peer->fifoName_ =
       SegmentName::keyed(parsed->backplane, NameKind::fifo, peer->header().incarnation);
   return peer;
 }
 
 bool PeerWindow::hasOwner() const noexcept {
-  return process_ ? window_.isLocked() && !Process::hasEnded(process_) : window_.hasOwner();
+  return process_ ? isLocked() && !Process::hasEnded(process_) : window_.hasOwner();
 }
 
 void PeerWindow::notify(std::uint32_t index) noexcept {

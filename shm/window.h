@@ -23,6 +23,7 @@
 
 #include "shm/doorbell.h"
 #include "shm/fork_guard.h"
+#include "shm/process.h"
 #include "shm/segment.h"
 
 namespace mpf {
@@ -108,7 +109,12 @@ class PeerWindow {
   [[nodiscard]] bool isLost() const noexcept { return window_.isLost() || hints_.isLost(); }
   // Asks the kernel whether the owner is alive.
   [[nodiscard]] bool hasOwner() const noexcept;
-  // Becomes readable when the owner's process ends; empty if this process cannot find it.
+  // Whether the owner, or a forked child of it, holds the window's lock.
+  [[nodiscard]] bool isLocked() const noexcept { return window_.isLocked(); }
+  // Finds the owner's process. The watcher calls it once.
+  void openProcess() noexcept { process_ = Process::openOwner(header()); }
+  // Becomes readable when the owner's process ends; empty before openProcess(), and if this process
+  // cannot find it.
   [[nodiscard]] const FileDescriptor& process() const noexcept { return process_; }
   [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }
   [[nodiscard]] bool isClosed() const noexcept {

@@ -32,6 +32,11 @@ class PeerWindowsTest : public ShmTest {
   std::shared_ptr<PeerWindow> open() {
     return peers_->tryOpen(serverName(), SegmentKind::serverWindow);
   }
+  std::shared_ptr<PeerWindow> openAndWatch() {
+    auto window = open();
+    peers_->watchClosely(*window);
+    return window;
+  }
   void waitForDeaths(int deaths) {
     for (auto now = deaths_.load(); now < deaths; now = deaths_.load()) deaths_.wait(now);
   }
@@ -61,7 +66,7 @@ TEST_F(PeerWindowsTest, AWindowIsMappedOnce) {
 
 TEST_F(PeerWindowsTest, ADeathIsReportedAfterTheFilesAreRemoved) {
   const auto server = startServer();
-  const auto window = open();
+  const auto window = openAndWatch();
 
   server->end(SIGKILL);
   waitForDeaths(1);
@@ -71,10 +76,58 @@ TEST_F(PeerWindowsTest, ADeathIsReportedAfterTheFilesAreRemoved) {
   EXPECT_EQ(open(), nullptr);
 }
 
+// The timer of the watcher finds it.
+TEST_F(PeerWindowsTest, ADeathIsReportedEvenIfTheWindowIsNotWatchedClosely) {
+  const auto server = startServer();
+  const auto window = open();
+
+  server->end(SIGKILL);
+  waitForDeaths(1);
+
+  EXPECT_TRUE(window->isDead());
+}
+
+TEST_F(PeerWindowsTest, ADeathBeforeTheCloseWatchIsReported) {
+  const auto server = startServer();
+  const auto window = open();
+  server->end(SIGKILL);
+
+  peers_->watchClosely(*window);
+  waitForDeaths(1);
+
+  EXPECT_TRUE(window->isDead());
+}
+
+TEST_F(PeerWindowsTest, ADeathIsReportedOnceHoweverOftenTheWindowIsWatched) {
+  const auto server = startServer();
+  const auto window = openAndWatch();
+  peers_->watchClosely(*window);
+
+  server->end(SIGKILL);
+  waitForDeaths(1);
+  peers_.reset();  // no report comes after this
+
+  EXPECT_EQ(deaths_, 1);
+}
+
+TEST_F(PeerWindowsTest, TheLastReleaseUnmapsAWindow) {
+  const auto server = startServer();
+  auto first = openAndWatch();
+  auto second = open();
+  const std::weak_ptr<PeerWindow> window = first;
+
+  peers_->release(std::move(first));
+  EXPECT_FALSE(window.expired()) << "another link uses it";
+  EXPECT_EQ(open(), second);
+  peers_->release(std::move(second));
+
+  EXPECT_TRUE(window.expired());
+}
+
 // A server that is killed while it shuts down has closed its window, but not yet its links.
 TEST_F(PeerWindowsTest, AClosedWindowIsWatchedUntilItsOwnerDies) {
   const auto server = startServer();
-  const auto window = open();
+  const auto window = openAndWatch();
   server->go();
   ASSERT_TRUE(server->waitUntilReady());
   EXPECT_EQ(open(), nullptr) << "new links do not use it";
@@ -87,12 +140,12 @@ TEST_F(PeerWindowsTest, AClosedWindowIsWatchedUntilItsOwnerDies) {
 
 TEST_F(PeerWindowsTest, AfterADeathTheNameStandsForTheSuccessor) {
   auto server = startServer();
-  const auto former = open();
+  const auto former = openAndWatch();
   server->end(SIGKILL);
   waitForDeaths(1);
 
   server = startServer();
-  const auto present = open();
+  const auto present = openAndWatch();
 
   ASSERT_TRUE(present);
   EXPECT_NE(present, former);
@@ -104,7 +157,7 @@ TEST_F(PeerWindowsTest, AfterADeathTheNameStandsForTheSuccessor) {
 
 TEST_F(PeerWindowsTest, NothingIsReportedAfterTheDestructor) {
   const auto server = startServer();
-  const auto window = open();
+  const auto window = openAndWatch();
   PeerWindows others(backplane_, [this] {
     deaths_ += 10;
     deaths_.notify_all();
