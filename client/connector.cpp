@@ -103,9 +103,10 @@ bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSe
 void Connector::askForAcceptance(Link& link) {
   cancelPendingBind();
   parts_.endpoint.attach(index_, link);
-  setReason(notAcceptedBecause(*link.peer()));
   link.peer()->knock(link.header().incarnation);
+  // The rest while the server accepts the client.
   parts_.endpoint.peers().watchClosely(*link.peer());
+  setReason(notAcceptedBecause(*link.peer()));
 }
 
 void Connector::askAgain(Link& link) {

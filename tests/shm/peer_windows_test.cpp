@@ -3,6 +3,10 @@
 #include "shm/peer_windows.h"
 
 #include <signal.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <memory>
@@ -96,6 +100,32 @@ TEST_F(PeerWindowsTest, ADeathBeforeTheCloseWatchIsReported) {
   waitForDeaths(1);
 
   EXPECT_TRUE(window->isDead());
+}
+
+// A child that was made without the handlers of fork() holds the lock of its dead parent.
+TEST_F(PeerWindowsTest, AnOwnerThatDiedBeforeTheOpenIsReportedEvenIfItsChildHoldsTheLock) {
+  Child server([this](Child::Self& self) {
+    const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
+                           [](layout::SegmentHeader&) {});
+    if (::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) == 0) {
+      ::prctl(PR_SET_PDEATHSIG, 0);
+      self.ready();  // until the test calls go()
+      ::_exit(0);
+    }
+    ::pause();
+  });
+  ::kill(server.pid(), SIGKILL);
+  siginfo_t ended{};
+  ::waitid(P_PID, static_cast<id_t>(server.pid()), &ended, WEXITED | WNOWAIT);
+
+  const auto window = open();
+  ASSERT_TRUE(window);
+  peers_->watchClosely(*window);
+  waitForDeaths(1);
+  server.go();
+
+  EXPECT_TRUE(window->isDead());
+  EXPECT_EQ(open(), nullptr);
 }
 
 TEST_F(PeerWindowsTest, ADeathIsReportedOnceHoweverOftenTheWindowIsWatched) {
