@@ -104,7 +104,7 @@ void Connector::askForAcceptance(Link& link) {
   cancelPendingBind();
   parts_.endpoint.attach(index_, link);
   link.peer()->knock(link.header().incarnation);
-  // The rest while the server accepts the client.
+  // After the knock, so that the server accepts the client meanwhile.
   parts_.endpoint.peers().watchClosely(*link.peer());
   setReason(notAcceptedBecause(*link.peer()));
 }

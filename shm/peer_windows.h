@@ -28,15 +28,14 @@ class PeerWindows {
   PeerWindows(const PeerWindows&) = delete;
   PeerWindows& operator=(const PeerWindows&) = delete;
 
-  // The window of this name; nullptr if there is no open one whose owner holds its lock.
+  // The window of this name; nullptr if no window of this name is open and locked.
   //   throws  as PeerWindow::tryOpen() and Watcher::addPeer()
   std::shared_ptr<PeerWindow> tryOpen(const std::string& name, layout::SegmentKind kind);
-  // Lets the death of the owner of a window from tryOpen() be reported at once; until then it is
-  // reported within 100 ms. A step of its own, to be taken while the peer works on the new link,
-  // because it takes about as long as the opening.
+  // From now on the death of the owner of a window from tryOpen() is reported at once; before that,
+  // within 100 ms. Call it after the peer was told of the link, so that both work at the same time.
   void watchClosely(const PeerWindow& window) noexcept;
-  // At the end of a link: unmaps the window if this was the last use. Otherwise a later tryOpen()
-  // does.
+  // Gives up one use of a window, at the end of a link, and unmaps the window after the last one. A
+  // later tryOpen() unmaps those that were not released.
   void release(std::shared_ptr<PeerWindow> window) noexcept;
 
  private:

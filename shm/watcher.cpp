@@ -100,6 +100,7 @@ Watcher::Token Watcher::addPeer(std::shared_ptr<PeerWindow> peer, Callback callb
   start();
   const auto token = next_++;
   peers_.emplace(token, Peer{std::move(peer), std::move(callback)});
+  ++polledPeers_;
   updateTimer();
   return token;
 }
@@ -107,12 +108,13 @@ Watcher::Token Watcher::addPeer(std::shared_ptr<PeerWindow> peer, Callback callb
 void Watcher::watchProcess(Token token) noexcept {
   const std::lock_guard lock(mutex_);
   const auto found = peers_.find(token);
-  if (found == peers_.end()) return;  // reported
+  if (found == peers_.end()) return;  // already reported
   auto& peer = found->second;
   peer.window->openProcess();
   const auto& process = peer.window->process();
   if (!process || !tryAdd(epoll_.get(), process.get(), token)) return pollAtOnce();
   peer.isPolled = false;
+  --polledPeers_;
   updateTimer();
 }
 
@@ -142,17 +144,17 @@ void Watcher::openNames() {
   add(epoll_.get(), names_.get(), kNames);
 }
 
-// Others may keep the window, and with it the descriptor of its process.
-void Watcher::leaveEpoll(Peer& peer) const noexcept {
-  if (std::exchange(peer.isPolled, true)) return;
-  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, peer.window->process().get(), nullptr);
+// Before a peer is removed: others may keep its window, and with it the descriptor of its process.
+void Watcher::unwatch(const Peer& peer) noexcept {
+  if (peer.isPolled) --polledPeers_;
+  else ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, peer.window->process().get(), nullptr);
 }
 
 void Watcher::forget(Token token) {
   if (isInherited()) return;  // the epoll instance is shared with the parent
   const std::lock_guard lock(mutex_);
   if (const auto found = peers_.find(token); found != peers_.end()) {
-    leaveEpoll(found->second);
+    unwatch(found->second);
     peers_.erase(found);
   }
   if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty() && names_) {
@@ -192,7 +194,7 @@ bool Watcher::isGone(const Peer& peer) const {
 
 void Watcher::report(Token token) {
   const auto found = peers_.find(token);
-  leaveEpoll(found->second);
+  unwatch(found->second);
   const auto peer = std::move(found->second);
   peers_.erase(found);
   updateTimer();
@@ -242,8 +244,7 @@ void Watcher::pollAtOnce() {
 
 // Does not restart a running timer: frequent changes must not delay it.
 void Watcher::updateTimer() {
-  bool needed = !names_ && !nameCallbacks_.empty();
-  for (const auto& [token, peer] : peers_) needed = needed || peer.isPolled;
+  const bool needed = polledPeers_ != 0 || (!names_ && !nameCallbacks_.empty());
   if (needed == polls_) return;
   polls_ = needed;
   itimerspec spec{};

@@ -6,9 +6,9 @@
 //   new name in /dev/shm ─► callbacks for its kind (clients: servers; routers: pending binds)
 //
 // Threads  any thread may call; callbacks run on the watcher's thread and must not block.
-// Crash    as long as a peer has no pidfd here (another pid namespace, a reused pid, no free
-//          descriptor), the watcher checks its lock every 100 ms. Likewise, it calls the callbacks
-//          for names every 100 ms if the user has no free inotify instance.
+// Crash    as long as a peer has no pidfd here (before watchProcess(), another pid namespace, a
+//          reused pid, no free descriptor), the watcher asks for its owner every 100 ms. Likewise,
+//          it calls the callbacks for names every 100 ms if the user has no free inotify instance.
 // Trust    the pid of a window is from a header that its owner alone writes. Without a pidfd, the
 //          kernel's lock is the proof.
 #pragma once
@@ -37,12 +37,13 @@ class Watcher {
   explicit Watcher(std::string backplane);
   ~Watcher();
 
-  // Calls `callback` once, after the owner of `peer`, which is not watched yet, has died or closed
-  // its window, possibly before this call: within 100 ms, or at once after watchProcess(). Then
-  // peer->isDead() is true.
+  // Calls `callback` once, within 100 ms after the owner of `peer`, which is not watched yet, has
+  // died or closed its window, or after this call if that happened before. Then peer->isDead() is
+  // true.
   //   throws  std::system_error: no thread can be started; std::bad_alloc
   Token addPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
-  // Called once for a peer, by the thread that uses its window.
+  // Reports the death of this peer at once from now on, if its process can be opened. To be called
+  // once for a peer, by the thread that uses its window.
   void watchProcess(Token token) noexcept;
   // Both steps.
   Token watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
@@ -56,11 +57,11 @@ class Watcher {
   struct Peer {
     std::shared_ptr<PeerWindow> window;
     Callback callback;
-    bool isPolled = true;  // or its process is in epoll_
+    bool isPolled = true;  // false: its process is in epoll_
   };
   void start();
   void run();
-  void leaveEpoll(Peer& peer) const noexcept;
+  void unwatch(const Peer& peer) noexcept;
   void handle(Token token);
   bool isGone(const Peer& peer) const;
   void report(Token token);
@@ -84,6 +85,7 @@ class Watcher {
   std::recursive_mutex mutex_;  // callbacks run under it, which makes the promise of forget() true
   Token next_ = 16;  // lower tokens: the watcher's own descriptors
   std::map<Token, Peer> peers_;
+  std::size_t polledPeers_ = 0;
   std::map<Token, Names> nameCallbacks_;
   bool polls_ = false;  // whether the timer runs
   std::thread thread_;

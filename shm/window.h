@@ -109,7 +109,7 @@ class PeerWindow {
   [[nodiscard]] bool isLost() const noexcept { return window_.isLost() || hints_.isLost(); }
   // Asks the kernel whether the owner is alive.
   [[nodiscard]] bool hasOwner() const noexcept;
-  // Whether a process holds the owner's lock: the owner, or a child that clone() made of it.
+  // Whether a process holds the owner's lock: the owner, or a child that it made with clone().
   [[nodiscard]] bool isLocked() const noexcept { return window_.isLocked(); }
   // Finds the owner's process. The watcher calls it once.
   void openProcess() noexcept { process_ = Process::openOwner(header()); }

@@ -80,7 +80,7 @@ TEST_F(PeerWindowsTest, ADeathIsReportedAfterTheFilesAreRemoved) {
   EXPECT_EQ(open(), nullptr);
 }
 
-// The timer of the watcher finds it.
+// The timer of the watcher finds the death.
 TEST_F(PeerWindowsTest, ADeathIsReportedEvenIfTheWindowIsNotWatchedClosely) {
   const auto server = startServer();
   const auto window = open();
