@@ -137,7 +137,7 @@ void Binding::resumeEnd() {
 }
 
 void Binding::endAll() {
-  const auto channel = sender_.channel();
+  auto channel = sender_.channel();
   const auto requests = sender_.requests();
   const auto ending = end_.ending;
   deliverRemaining(channel.get());
@@ -150,6 +150,7 @@ void Binding::endAll() {
   if (sender_.channel() != channel) return;  // a callback destroyed the client
   const bool wasConnected = end_.wasConnected;
   resume();  // a callback may have called pause() again
+  channel.reset();
   connector_.closeLink(sender_);
   if (!hasLeft()) setState(BindingState::waiting);
   try {

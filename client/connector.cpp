@@ -70,6 +70,8 @@ std::shared_ptr<PeerWindow> Connector::tryFindServer() {
   auto server = endpoint.peers().tryOpen(
       SegmentName::serverWindow(endpoint.backplane().name(), location_, server_),
       layout::SegmentKind::serverWindow);
+  // A dead server, whose window is still locked and cannot be removed, is not tried again.
+  if (server && server->header().incarnation == incarnation_ && !server->hasOwner()) server.reset();
   if (!server) publishPendingBind();
   return server;
 }
@@ -104,8 +106,6 @@ void Connector::askForAcceptance(Link& link) {
   cancelPendingBind();
   parts_.endpoint.attach(index_, link);
   link.peer()->knock(link.header().incarnation);
-  // After the knock, so that the server accepts the client meanwhile.
-  parts_.endpoint.peers().watchClosely(*link.peer());
   setReason(notAcceptedBecause(*link.peer()));
 }
 

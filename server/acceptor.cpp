@@ -105,7 +105,6 @@ void Acceptor::open(std::unique_ptr<Link> link) {
   auto& connection = connections_.add(*index, std::move(link));
   noteShortage(layout::Shortage::none, {});
   connections_.open(connection);
-  endpoint_.peers().watchClosely(*connection.channel->link().peer());
 }
 
 // Each shortage counts as one alarm, for any number of clients that the server cannot accept.

@@ -84,6 +84,7 @@ void Endpoint::release(std::uint32_t index, Link& link) noexcept {
 }
 
 MaybeIndex Endpoint::nextOther() noexcept {
+  peers_.settle();
   if (polledLeft_ != 0) return nextReady();
   if (armed_) disarm();
   if (const auto index = nextCold()) return index;

@@ -17,7 +17,6 @@ PeerWindows::~PeerWindows() {
 
 std::shared_ptr<PeerWindow> PeerWindows::tryOpen(const std::string& name,
                                                  layout::SegmentKind kind) {
-  dropUnused(peers_.begin(), peers_.end());
   const auto [first, last] = peers_.equal_range(name);
   for (auto peer = first; peer != last; ++peer) {
     auto window = peer->second.window.lock();
@@ -31,20 +30,22 @@ std::shared_ptr<PeerWindow> PeerWindows::tryOpen(const std::string& name,
     stale_segments::removeDeadWindow(backplane_.name(), name, incarnation);
     onDeath_();
   };
-  peers_.emplace(name, Peer{window, backplane_.watcher().addPeer(window, clean)});
+  auto& peer = peers_.emplace(name, Peer{window})->second;
+  hasNew_ = true;
+  peer.token = backplane_.watcher().addPeer(window, clean);
   return window;
 }
 
-void PeerWindows::watchClosely(const PeerWindow& window) noexcept {
-  const auto [first, last] = peers_.equal_range(window.name());
-  for (auto peer = first; peer != last; ++peer) {
-    if (peer->second.window.lock().get() != &window) continue;
-    if (!std::exchange(peer->second.isWatchedClosely, true))
-      backplane_.watcher().watchProcess(peer->second.token);
+void PeerWindows::settleAll() noexcept {
+  dropUnused(peers_.begin(), peers_.end());
+  for (auto& [name, peer] : peers_) {
+    if (!std::exchange(peer.isWatchedClosely, true)) backplane_.watcher().watchProcess(peer.token);
   }
 }
 
+// After many deaths at once, the watcher's thread would compete with the caller for its mutex.
 void PeerWindows::release(std::shared_ptr<PeerWindow> window) noexcept {
+  if (window->isDead()) return;
   const auto [first, last] = peers_.equal_range(window->name());
   window.reset();
   dropUnused(first, last);

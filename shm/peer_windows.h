@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <mpf/backplane.h>
 
@@ -31,20 +32,24 @@ class PeerWindows {
   // The window of this name; nullptr if no window of this name is open and locked.
   //   throws  as PeerWindow::tryOpen() and Watcher::addPeer()
   std::shared_ptr<PeerWindow> tryOpen(const std::string& name, layout::SegmentKind kind);
-  // From now on the death of the owner of a window from tryOpen() is reported at once; before that,
-  // within 100 ms. Call it after the peer was told of the link, so that both work at the same time.
-  void watchClosely(const PeerWindow& window) noexcept;
-  // Gives up one use of a window, at the end of a link, and unmaps the window after the last one. A
-  // later tryOpen() unmaps those that were not released.
+  // Finishes what tryOpen() has begun, after the peer was told of the link, so that both work at the
+  // same time: from now on the death of an owner is reported at once, before that within 100 ms.
+  // Unmaps the windows that no link uses. Cheap when no window was opened since the last call.
+  void settle() noexcept {
+    if (std::exchange(hasNew_, false)) settleAll();
+  }
+  // Gives up one use of a window, at the end of a link, and unmaps the window after the last one,
+  // unless its owner is dead; then a later settle() does.
   void release(std::shared_ptr<PeerWindow> window) noexcept;
 
  private:
   struct Peer {
     std::weak_ptr<PeerWindow> window;
-    Watcher::Token token;
+    Watcher::Token token = 0;  // 0: not watched, and not used by a link
     bool isWatchedClosely = false;
   };
   using Peers = std::multimap<std::string, Peer>;
+  void settleAll() noexcept;
   void dropUnused(Peers::iterator from, Peers::iterator to) noexcept;
 
   ForkGuard forkGuard_;
@@ -52,6 +57,7 @@ class PeerWindows {
   std::function<void()> onDeath_;
   // By name: the current window, and older windows of the name whose links have not ended yet.
   Peers peers_;
+  bool hasNew_ = false;  // a window was opened since the last settle()
 };
 
 }  // namespace mpf

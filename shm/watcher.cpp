@@ -17,6 +17,7 @@
 #include "base/step.h"
 #include "base/system_call.h"
 #include "base/timespec.h"
+#include "shm/process.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -106,14 +107,20 @@ Watcher::Token Watcher::addPeer(std::shared_ptr<PeerWindow> peer, Callback callb
 }
 
 void Watcher::watchProcess(Token token) noexcept {
+  std::shared_ptr<PeerWindow> window;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = peers_.find(token);
+    if (found == peers_.end()) return;  // already reported
+    window = found->second.window;
+  }
+  auto process = Process::openOwner(window->header());
   const std::lock_guard lock(mutex_);
   const auto found = peers_.find(token);
-  if (found == peers_.end()) return;  // already reported
-  auto& peer = found->second;
-  peer.window->openProcess();
-  const auto& process = peer.window->process();
+  if (found == peers_.end()) return;
   if (!process || !tryAdd(epoll_.get(), process.get(), token)) return pollAtOnce();
-  peer.isPolled = false;
+  window->setProcess(std::move(process));
+  found->second.isPolled = false;
   --polledPeers_;
   updateTimer();
 }

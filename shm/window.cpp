@@ -14,6 +14,7 @@
 
 #include "base/expedited_barrier.h"
 #include "base/step.h"
+#include "shm/process.h"
 #include "shm/segment_name.h"
 
 namespace mpf {

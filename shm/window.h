@@ -18,12 +18,12 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include <mpf/wait_mode.h>
 
 #include "shm/doorbell.h"
 #include "shm/fork_guard.h"
-#include "shm/process.h"
 #include "shm/segment.h"
 
 namespace mpf {
@@ -111,9 +111,9 @@ class PeerWindow {
   [[nodiscard]] bool hasOwner() const noexcept;
   // Whether a process holds the owner's lock: the owner, or a child that it made with clone().
   [[nodiscard]] bool isLocked() const noexcept { return window_.isLocked(); }
-  // Finds the owner's process. The watcher calls it once.
-  void openProcess() noexcept { process_ = Process::openOwner(header()); }
-  // Becomes readable when the owner's process ends; empty before openProcess(), and if this process
+  // Called once, by the watcher.
+  void setProcess(FileDescriptor process) noexcept { process_ = std::move(process); }
+  // Becomes readable when the owner's process ends; empty before setProcess(), and if this process
   // cannot find it.
   [[nodiscard]] const FileDescriptor& process() const noexcept { return process_; }
   [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }

@@ -1,6 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "client/connector.h"
 
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
 #include <gtest/gtest.h>
 #include <stdexcept>
 
@@ -8,6 +16,7 @@
 
 #include "shm/segment_name.h"
 #include "tests/client/binding_parts_fixture.h"
+#include "tests/shm/child.h"
 
 namespace mpf::test {
 namespace {
@@ -20,6 +29,17 @@ class ConnectorTest : public BindingPartsTest {
       if (parsed && parsed->kind == NameKind::pendingBind) return true;
     }
     return false;
+  }
+  [[nodiscard]] std::string serverWindow() const {
+    return SegmentName::serverWindow(backplane_.name(), 0, "dac");
+  }
+  // How often this process has mapped the server's window.
+  [[nodiscard]] int mappings() const {
+    std::ifstream maps("/proc/self/maps");
+    int found = 0;
+    for (std::string line; std::getline(maps, line);)
+      found += line.find(serverWindow()) != std::string::npos ? 1 : 0;
+    return found;
   }
 };
 
@@ -67,6 +87,44 @@ TEST_F(ConnectorTest, OpensALinkThatTheServerAccepts) {
   EXPECT_EQ(connector_.incarnation(), window->header().incarnation);
   connector_.closeLink(sender_);
   EXPECT_FALSE(sender_.channel());
+}
+
+TEST_F(ConnectorTest, UnmapsTheServersWindowAtTheEndOfTheLink) {
+  const MessageServer server(backplane_, "dac");
+  const auto before = mappings();
+  connector_.setServer("dac", 0);
+  ASSERT_TRUE(connector_.tryOpenLink(connector_.tryFindServer(), sender_, *owner_));
+  EXPECT_EQ(mappings(), before + 1);
+
+  connector_.closeLink(sender_);
+
+  EXPECT_EQ(mappings(), before);
+}
+
+// The watcher may have no right to remove the window of a dead server; here nobody has reported the
+// death yet. A child that was made without the handlers of fork() keeps the lock.
+TEST_F(ConnectorTest, DoesNotTryADeadServerAgainThatKeepsItsWindow) {
+  Child server([this](Child::Self& self) {
+    const OwnWindow window(backplane_.name(), layout::SegmentKind::serverWindow, serverWindow(), {},
+                           [](layout::SegmentHeader&) {});
+    if (::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) == 0) {
+      ::prctl(PR_SET_PDEATHSIG, 0);
+      self.ready();  // until the test calls go()
+      ::_exit(0);
+    }
+    ::pause();
+  });
+  ::kill(server.pid(), SIGKILL);
+  siginfo_t ended{};
+  ::waitid(P_PID, static_cast<id_t>(server.pid()), &ended, WEXITED | WNOWAIT);
+  connector_.setServer("dac", 0);
+  ASSERT_TRUE(connector_.tryOpenLink(connector_.tryFindServer(), sender_, *owner_));
+  connector_.closeLink(sender_);
+
+  EXPECT_FALSE(connector_.tryFindServer());
+
+  EXPECT_TRUE(hasPendingBind());
+  server.go();
 }
 
 TEST_F(ConnectorTest, WithdrawsThePendingBindWhenTheServerStarts) {

@@ -94,6 +94,26 @@ TEST_F(EndTest, AServerUnmapsTheWindowsOfClientsThatDisconnected) {
   EXPECT_LE(openDescriptors(), before + 4);
 }
 
+// Of its peer, each side has the descriptors of a window and of a process.
+TEST_F(EndTest, NeitherSideKeepsDescriptorsOfAConnectionThatHasEnded) {
+  auto& server = startServer();
+  Dispatcher dispatcher(backplane_);
+  const auto before = openDescriptors();
+  {
+    MessageClient client(dispatcher, [](const Message&) {});
+    client.bind("device[0]/a");
+    while (!client.isConnected()) {
+      server.handleOne();
+      dispatcher.runOnce(Deadline::after(100us));
+    }
+    EXPECT_GT(openDescriptors(), before);
+  }
+
+  while (sumOf(&layout::WindowControl::linksClosed) != 2) server.handleOne();
+
+  EXPECT_EQ(openDescriptors(), before);
+}
+
 // A connect that fails because of missing memory uses up nothing permanently.
 TEST_F(EndTest, AFailedConnectUsesUpNoIndex) {
   if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";

@@ -63,7 +63,6 @@ class Peer {
     while (!server)
       server = endpoint_.peers().tryOpen(SegmentName::serverWindow(backplane(), 0, kServer),
                                          layout::SegmentKind::serverWindow);
-    endpoint_.peers().watchClosely(*server);
     auto link = Link::create(backplane(), endpoint_.window(), index, server);
     endpoint_.attach(index, *link);
     // The server may still be busy with earlier attacks.
@@ -94,7 +93,6 @@ class Peer {
         SegmentName::keyed(backplane(), NameKind::clientWindow, link->header().clientWindow),
         layout::SegmentKind::clientWindow);
     if (!client) return nullptr;
-    endpoint_.peers().watchClosely(*client);
     link->attachPeer(std::move(client), link->header().clientIndex);
     endpoint_.attach(index, *link);
     link->control().serverIndex.store(index, std::memory_order_relaxed);

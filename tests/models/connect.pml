@@ -13,7 +13,7 @@
 //   MODELS  server/connections.cpp: add open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify
 //   MODELS  shm/knocks.cpp: tryTake takeRescan
-//   MODELS  shm/peer_windows.cpp: tryOpen watchClosely
+//   MODELS  shm/peer_windows.cpp: tryOpen settleAll
 //   HOLDS   a running client connects to a running server, even if any hints are lost
 //   HOLDS   its request ends exactly once; a request that a server acted on never ends as "never
 //           taken"; a reply that was sent is not lost

@@ -82,7 +82,6 @@ inline Connected connect(End& client, End& server) {
   const std::string_view serverName(server.endpoint.window().header().name.data());
   auto peer = client.endpoint.peers().tryOpen(SegmentName::serverWindow(backplane, 0, serverName),
                                               layout::SegmentKind::serverWindow);
-  client.endpoint.peers().watchClosely(*peer);
   auto& ours = client.keep(
       clientIndex, Link::create(backplane, client.endpoint.window(), clientIndex, std::move(peer)));
   auto link = Link::tryOpen(backplane, ours.name(), server.endpoint.window());
@@ -90,7 +89,6 @@ inline Connected connect(End& client, End& server) {
       SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
   link->attachPeer(server.endpoint.peers().tryOpen(clientName, layout::SegmentKind::clientWindow),
                    link->header().clientIndex);
-  server.endpoint.peers().watchClosely(*link->peer());
   auto& theirs = server.keep(serverIndex, std::move(link));
   ours.setPeerIndex(serverIndex);
   return {ours, theirs, clientIndex, serverIndex};

@@ -285,7 +285,6 @@ TEST_F(EndpointTest, ReportsAPeersDeathAsALocalEvent) {
   End client(backplane_, "");
   const auto peer =
       client.endpoint.peers().tryOpen(serverName(), layout::SegmentKind::serverWindow);
-  client.endpoint.peers().watchClosely(*peer);
 
   child.end(SIGKILL);
 

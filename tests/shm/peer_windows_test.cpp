@@ -38,7 +38,7 @@ class PeerWindowsTest : public ShmTest {
   }
   std::shared_ptr<PeerWindow> openAndWatch() {
     auto window = open();
-    peers_->watchClosely(*window);
+    peers_->settle();
     return window;
   }
   void waitForDeaths(int deaths) {
@@ -96,7 +96,7 @@ TEST_F(PeerWindowsTest, ADeathBeforeTheCloseWatchIsReported) {
   const auto window = open();
   server->end(SIGKILL);
 
-  peers_->watchClosely(*window);
+  peers_->settle();
   waitForDeaths(1);
 
   EXPECT_TRUE(window->isDead());
@@ -120,7 +120,7 @@ TEST_F(PeerWindowsTest, AnOwnerThatDiedBeforeTheOpenIsReportedEvenIfItsChildHold
 
   const auto window = open();
   ASSERT_TRUE(window);
-  peers_->watchClosely(*window);
+  peers_->settle();
   waitForDeaths(1);
   server.go();
 
@@ -131,7 +131,7 @@ TEST_F(PeerWindowsTest, AnOwnerThatDiedBeforeTheOpenIsReportedEvenIfItsChildHold
 TEST_F(PeerWindowsTest, ADeathIsReportedOnceHoweverOftenTheWindowIsWatched) {
   const auto server = startServer();
   const auto window = openAndWatch();
-  peers_->watchClosely(*window);
+  peers_->settle();
 
   server->end(SIGKILL);
   waitForDeaths(1);
