@@ -32,9 +32,9 @@ class PeerWindows {
   // The window of this name; nullptr if no window of this name is open and locked.
   //   throws  as PeerWindow::tryOpen() and Watcher::addPeer()
   std::shared_ptr<PeerWindow> tryOpen(const std::string& name, layout::SegmentKind kind);
-  // Finishes what tryOpen() has begun, after the peer was told of the link, so that both work at the
-  // same time: from now on the death of an owner is reported at once, before that within 100 ms.
-  // Unmaps the windows that no link uses. Cheap when no window was opened since the last call.
+  // Finishes what tryOpen() has begun, after the peer was told of the link, so that both work at
+  // the same time: from now on the death of an owner is reported at once, before that within 100
+  // ms. Unmaps the windows that no link uses. Cheap when no window was opened since the last call.
   void settle() noexcept {
     if (std::exchange(hasNew_, false)) settleAll();
   }
