@@ -70,8 +70,11 @@ std::shared_ptr<PeerWindow> Connector::tryFindServer() {
   auto server = endpoint.peers().tryOpen(
       SegmentName::serverWindow(endpoint.backplane().name(), location_, server_),
       layout::SegmentKind::serverWindow);
-  // A dead server, whose window is still locked and cannot be removed, is not tried again.
-  if (server && server->header().incarnation == incarnation_ && !server->hasOwner()) server.reset();
+  // A dead server, whose window is still locked and cannot be removed, is not tried again at once.
+  if (server && server->header().incarnation == incarnation_ && !server->hasOwner()) {
+    server.reset();
+    retryLater();
+  }
   if (!server) publishPendingBind();
   return server;
 }

@@ -38,8 +38,8 @@ class PeerWindows {
   void settle() noexcept {
     if (std::exchange(hasNew_, false)) settleAll();
   }
-  // Gives up one use of a window, at the end of a link, and unmaps the window after the last one,
-  // unless its owner is dead; then a later settle() does.
+  // At the end of a link: unmaps the window of a living peer if nothing else uses it. Otherwise it
+  // is unmapped after the last use, by settle() if the peer lives.
   void release(std::shared_ptr<PeerWindow> window) noexcept;
 
  private:

@@ -107,7 +107,9 @@ TEST_F(ConnectorTest, DoesNotTryADeadServerAgainThatKeepsItsWindow) {
   Child server([this](Child::Self& self) {
     const OwnWindow window(backplane_.name(), layout::SegmentKind::serverWindow, serverWindow(), {},
                            [](layout::SegmentHeader&) {});
-    if (::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) == 0) {
+    const auto child = ::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0);
+    if (child < 0) ::_exit(1);
+    if (child == 0) {
       ::prctl(PR_SET_PDEATHSIG, 0);
       self.ready();  // until the test calls go()
       ::_exit(0);
@@ -124,6 +126,7 @@ TEST_F(ConnectorTest, DoesNotTryADeadServerAgainThatKeepsItsWindow) {
   EXPECT_FALSE(connector_.tryFindServer());
 
   EXPECT_TRUE(hasPendingBind());
+  EXPECT_FALSE(parts_.timer.due().isNever()) << "a successor is found even if its name was missed";
   server.go();
 }
 

@@ -107,7 +107,9 @@ TEST_F(PeerWindowsTest, AnOwnerThatDiedBeforeTheOpenIsReportedEvenIfItsChildHold
   Child server([this](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
-    if (::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) == 0) {
+    const auto child = ::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0);
+    if (child < 0) ::_exit(1);
+    if (child == 0) {
       ::prctl(PR_SET_PDEATHSIG, 0);
       self.ready();  // until the test calls go()
       ::_exit(0);
