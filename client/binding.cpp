@@ -150,7 +150,7 @@ void Binding::endAll() {
   if (sender_.channel() != channel) return;  // a callback destroyed the client
   const bool wasConnected = end_.wasConnected;
   resume();  // a callback may have called pause() again
-  channel.reset();
+  channel.reset();  // else the window of the server could not be unmapped
   connector_.closeLink(sender_);
   if (!hasLeft()) setState(BindingState::waiting);
   try {

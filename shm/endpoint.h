@@ -77,6 +77,7 @@ class Endpoint {
     if (index) --polledLeft_;
     return index;
   }
+  // Also settles the windows of new peers.
   MaybeIndex nextOther() noexcept;
   // Whether there may be an event that is not one of a link: a knock, a rescan or a local event.
   // Cheap: three loads.

@@ -43,8 +43,9 @@ void PeerWindows::settleAll() noexcept {
   }
 }
 
-// After many deaths at once, the watcher's thread would compete with the caller for its mutex.
 void PeerWindows::release(std::shared_ptr<PeerWindow> window) noexcept {
+  // Nobody watches a dead peer. After many deaths at once, forget() would wait for the watcher's
+  // thread, which reports them.
   if (window->isDead()) return;
   const auto [first, last] = peers_.equal_range(window->name());
   window.reset();

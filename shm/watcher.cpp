@@ -111,7 +111,7 @@ void Watcher::watchProcess(Token token) noexcept {
   {
     const std::lock_guard lock(mutex_);
     const auto found = peers_.find(token);
-    if (found == peers_.end() || !found->second.isPolled) return;  // reported, or called before
+    if (found == peers_.end()) return;  // already reported
     window = found->second.window;
   }
   auto process = Process::openOwner(window->header());

@@ -109,7 +109,8 @@ class PeerWindow {
   [[nodiscard]] bool isLost() const noexcept { return window_.isLost() || hints_.isLost(); }
   // Asks the kernel whether the owner is alive.
   [[nodiscard]] bool hasOwner() const noexcept;
-  // Whether a process holds the owner's lock: the owner, or a child that it made with clone().
+  // Whether a process holds the owner's lock: the owner, or a child that it made without the
+  // handlers of fork().
   [[nodiscard]] bool isLocked() const noexcept { return window_.isLocked(); }
   // Called once, by the watcher.
   void setProcess(FileDescriptor process) noexcept { process_ = std::move(process); }

@@ -276,6 +276,17 @@ TEST_F(EndpointTest, AKnockIsAControlEvent) {
   EXPECT_TRUE(server.endpoint.knocks().takeRescan());
 }
 
+TEST_F(EndpointTest, OpensTheProcessOfANewPeerBesideItsMessages) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  const auto link = connect(client, server);
+  EXPECT_FALSE(link.client.peer()->process());
+
+  static_cast<void>(client.endpoint.next());
+
+  EXPECT_TRUE(link.client.peer()->process());
+}
+
 TEST_F(EndpointTest, ReportsAPeersDeathAsALocalEvent) {
   Child child([&](Child::Self& self) {
     const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},

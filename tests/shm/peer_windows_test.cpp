@@ -3,16 +3,13 @@
 #include "shm/peer_windows.h"
 
 #include <signal.h>
-#include <sys/prctl.h>
-#include <sys/syscall.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <memory>
 #include <optional>
 
 #include "tests/shm/child.h"
+#include "tests/shm/dead_server.h"
 #include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
@@ -91,40 +88,22 @@ TEST_F(PeerWindowsTest, ADeathIsReportedEvenIfTheWindowIsNotWatchedClosely) {
   EXPECT_TRUE(window->isDead());
 }
 
-TEST_F(PeerWindowsTest, ADeathBeforeTheCloseWatchIsReported) {
+TEST_F(PeerWindowsTest, TheProcessOfAPeerIsOpenedWhenThePeersSettle) {
   const auto server = startServer();
   const auto window = open();
-  server->end(SIGKILL);
+  EXPECT_FALSE(window->process());
 
   peers_->settle();
-  waitForDeaths(1);
 
-  EXPECT_TRUE(window->isDead());
+  EXPECT_TRUE(window->process());
 }
 
-// A child that was made without the handlers of fork() holds the lock of its dead parent.
-TEST_F(PeerWindowsTest, AnOwnerThatDiedBeforeTheOpenIsReportedEvenIfItsChildHoldsTheLock) {
-  Child server([this](Child::Self& self) {
-    const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
-                           [](layout::SegmentHeader&) {});
-    const auto child = ::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0);
-    if (child < 0) ::_exit(1);
-    if (child == 0) {
-      ::prctl(PR_SET_PDEATHSIG, 0);
-      self.ready();  // until the test calls go()
-      ::_exit(0);
-    }
-    ::pause();
-  });
-  ::kill(server.pid(), SIGKILL);
-  siginfo_t ended{};
-  ::waitid(P_PID, static_cast<id_t>(server.pid()), &ended, WEXITED | WNOWAIT);
+TEST_F(PeerWindowsTest, AnOwnerThatDiedBeforeTheOpenIsReportedEvenIfItsWindowIsLocked) {
+  const DeadServer server(name(), serverName());
 
-  const auto window = open();
+  const auto window = openAndWatch();
   ASSERT_TRUE(window);
-  peers_->settle();
   waitForDeaths(1);
-  server.go();
 
   EXPECT_TRUE(window->isDead());
   EXPECT_EQ(open(), nullptr);
