@@ -27,11 +27,12 @@ class Bias {
  public:
   // True when the bias is enabled for the calling thread, which is inside until leave().
   [[nodiscard, gnu::always_inline]] bool tryEnter() noexcept {
+    const auto me = threadNumberOrZero();
     // PAIR(bias-disabled): sees what the other thread did before it disabled the bias.
-    if (!isEnabled_.load(std::memory_order_acquire) || !isOwner()) return false;
+    if (enabledFor_.load(std::memory_order_acquire) != me) return false;
     isInside_.store(true, std::memory_order_relaxed);
     expedited_barrier::frequentSide();
-    if (isEnabled_.load(std::memory_order_relaxed)) return true;
+    if (enabledFor_.load(std::memory_order_relaxed) == me) return true;
     leave();
     return false;
   }
@@ -51,18 +52,16 @@ class Bias {
     if (std::exchange(lastThread_, me) != me) entries_ = 0;
     if (++entries_ % kEntries != 0 || !mayEnable()) return;
     owner_.store(me, std::memory_order_relaxed);
-    isEnabled_.store(true, std::memory_order_relaxed);
+    enabledFor_.store(me, std::memory_order_relaxed);
   }
-  [[nodiscard]] bool isOfAnotherThread() const noexcept {
-    return isEnabled_.load(std::memory_order_relaxed) && !isOwner();
-  }
+  [[nodiscard]] bool isOfAnotherThread() const noexcept { return isEnabled() && !isOwner(); }
   // Disables the bias, unless the calling thread is its owner. Returns false when the owner is
   // inside: then the caller waits until isInside() is false, or gives up.
   [[nodiscard]] bool disable() noexcept {
     if (isOwner()) return true;
-    if (isEnabled_.load(std::memory_order_relaxed)) {
+    if (isEnabled()) {
       // PAIR(bias-disabled): the owner uses the real lock from now on.
-      isEnabled_.store(false, std::memory_order_release);
+      enabledFor_.store(kNoThread, std::memory_order_release);
       expedited_barrier::inThisProcess();
     }
     return !isInside();
@@ -76,6 +75,9 @@ class Bias {
   static constexpr std::uint32_t kEntries = 256;
   static constexpr std::uint64_t kNoThread = 1;  // numbers of threads are even
 
+  [[nodiscard]] bool isEnabled() const noexcept {
+    return enabledFor_.load(std::memory_order_relaxed) != kNoThread;
+  }
   [[nodiscard]] bool isOwner() const noexcept {
     return owner_.load(std::memory_order_relaxed) == threadNumberOrZero();
   }
@@ -85,7 +87,7 @@ class Bias {
            expedited_barrier::tryRegister();
   }
 
-  std::atomic<bool> isEnabled_{false};
+  std::atomic<std::uint64_t> enabledFor_{kNoThread};  // the owner; kNoThread: disabled
   std::atomic<bool> isInside_{false};  // written by the owner
   std::atomic<std::uint64_t> owner_{kNoThread};  // written once
   std::uint64_t lastThread_ = 0;  // of the last entry by the real lock

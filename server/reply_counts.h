@@ -19,12 +19,12 @@ class ReplyCounts {
   // Called by a thread before it takes requests. The first such thread becomes the only writer of
   // `sent`, without a locked instruction; all others add to `sentElsewhere`.
   void noteServerThread() noexcept {
-    if (serverThread_.load(std::memory_order_relaxed) != 0) return;
-    std::uint64_t none = 0;
+    if (serverThread_.load(std::memory_order_relaxed) != kNoThread) return;
+    auto none = kNoThread;
     serverThread_.compare_exchange_strong(none, threadNumber(), std::memory_order_relaxed);
   }
   void sent(std::uint64_t replies = 1) noexcept {
-    if (serverThread_.load(std::memory_order_relaxed) == threadNumber())
+    if (serverThread_.load(std::memory_order_relaxed) == threadNumberOrZero())
       count(control_.sent, replies);
     else control_.sentElsewhere.fetch_add(replies, std::memory_order_relaxed);
   }
@@ -35,8 +35,10 @@ class ReplyCounts {
   void service(std::int64_t ns) noexcept { recordFromAnyThread(control_.serviceNs, ns); }
 
  private:
+  static constexpr std::uint64_t kNoThread = 1;  // numbers of threads are even
+
   layout::WindowControl& control_;
-  std::atomic<std::uint64_t> serverThread_{0};  // its threadNumber(); 0: none yet
+  std::atomic<std::uint64_t> serverThread_{kNoThread};  // its threadNumber()
 };
 
 }  // namespace mpf
