@@ -27,7 +27,7 @@
 
 namespace mpf {
 
-class Binding : public std::enable_shared_from_this<Binding> {
+class Binding final : public LinkUser, public std::enable_shared_from_this<Binding> {
  public:
   Binding(DispatcherParts& parts, MessageClient::Callback callback)
       : parts_(parts), callback_(std::move(callback)) {}

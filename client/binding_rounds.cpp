@@ -19,6 +19,9 @@ void BindingRounds::add(Place&& place) {
   isComplete_ = wasComplete;
 }
 
+// Moved first: a callback may own a client, whose end calls remove().
+void BindingRounds::dropRemoved() noexcept { const auto dropped = std::exchange(removed_, {}); }
+
 void BindingRounds::remove(const Binding& binding) noexcept {
   if (const auto found = bindings_.find(&binding); found != bindings_.end()) {
     schedule(found->second, INT64_MAX);

@@ -30,12 +30,9 @@ class BindingRounds {
   void add(Place&& place);
   // A binding that was added stays alive until dropRemoved().
   void remove(const Binding& binding) noexcept;
+  [[nodiscard]] bool hasRemoved() const noexcept { return !removed_.empty(); }
   // No callback of a removed binding is in progress.
-  void dropRemoved() noexcept {
-    if (removed_.empty()) return;
-    // Moved first: a callback may own a client, whose end calls remove().
-    const auto dropped = std::exchange(removed_, {});
-  }
+  void dropRemoved() noexcept;
 
   // A process has died: disconnects the bindings whose server it was.
   void beginDead() { dead_.begin(all()); }

@@ -80,7 +80,7 @@ std::shared_ptr<PeerWindow> Connector::tryFindServer() {
 }
 
 bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSender& sender,
-                            Binding& owner) {
+                            LinkUser& user) {
   auto& endpoint = parts_.endpoint;
   const auto index = endpoint.tryReserve();
   if (!index) {
@@ -92,8 +92,8 @@ bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSe
   try {
     endpoint.window().admit(Link::rightsAt(*server));  // the server writes hints into this window
     auto link = Link::create(endpoint.backplane().name(), endpoint.window(), *index, server);
+    link->setUser(user);
     auto channel = MessageLink::make(std::move(link), sender.lock());
-    parts_.linkOwners.set(*index, &owner);
     sender.open(std::move(channel));
   } catch (...) {
     endpoint.detach(*index);  // else each failed attempt would use up an index
@@ -137,7 +137,6 @@ void Connector::closeLink(RequestSender& sender) {
   MPF_STEP(bulk_removed);
   segments::remove(link.name());
   endpoint.detach(index_);
-  parts_.linkOwners.set(index_, nullptr);
   count(endpoint.control().linksClosed);
   auto server = link.peer();
   sender.close();

@@ -42,10 +42,10 @@ class Connector {
   // The server's window. Returns nullptr when there is no such server, and then watches for its
   // name and publishes a pending bind.
   std::shared_ptr<PeerWindow> tryFindServer();
-  // Opens a new link to `server`, which `owner` gets the events of. Returns false when the process
-  // has no index left; then a retry is due later.
+  // Opens a new link of `user` to `server`. Returns false when the process has no index left; then
+  // a retry is due later.
   [[nodiscard]] bool tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSender& sender,
-                                 Binding& owner);
+                                 LinkUser& user);
   // Asks the server to accept the new link.
   void askForAcceptance(Link& link);
   // As askForAcceptance(), again: the server may have missed it.

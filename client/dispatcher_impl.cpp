@@ -79,7 +79,8 @@ bool Dispatcher::Impl::takeStop() noexcept {
 
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
   const auto guard = becomeRunner();
-  return run(deadline, [this] { return takeStop(); });
+  if (takeStop()) return false;
+  return step() || run(deadline, [this] { return takeStop(); });
 }
 
 bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()>& isDone) {
@@ -96,7 +97,7 @@ bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()
 
 // Returns true when it has done something, false at the deadline and when isOver() returns true.
 template <class IsOver>
-bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
+[[gnu::noinline]] bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
   parts_.timer.setWaitingThread();
   for (std::uint32_t wakeups = 0;;) {
     // Checked even when every step finds work: a busy dispatcher must stop, too.
@@ -123,30 +124,32 @@ void Dispatcher::Impl::dropKnocks() noexcept {
 
 // When a callback throws, the interrupt() makes the next wait return immediately, so that the next
 // step handles the remaining work.
-bool Dispatcher::Impl::step() try { return tryStep(); } catch (...) {
+[[gnu::always_inline]] inline bool Dispatcher::Impl::step() try { return tryStep(); } catch (...) {
   endpoint().interrupt();
   throw;
 }
 
-bool Dispatcher::Impl::tryStep() {
+// Inline, because it is on the path of each message.
+[[gnu::always_inline]] inline bool Dispatcher::Impl::tryStep() {
   // A callback may run the dispatcher, too: bindings whose callback is in progress stay alive.
   const DepthGuard inside(depth_);
-  if (depth_ == 1) bindings_.dropRemoved();
-  bool hasActed = endpoint().takeLocalEvent() && handleLocalHints();
-  if (takeFrom(endpoint().nextPolled())) return true;
-  // nextPolled() returns nothing after some turns, so a busy dispatcher gets here, too.
-  hasActed = bindings_.resume() || hasActed;
-  hasActed = takeFrom(endpoint().nextOther()) || hasActed;
+  if (bindings_.hasRemoved() && depth_ == 1) bindings_.dropRemoved();
+  const bool hasActed = endpoint().takeLocalEvent() && handleLocalHints();
+  return takeFrom(endpoint().nextPolled()) || tryOthers() || hasActed;
+}
+
+// nextPolled() returns nothing after some turns, so a busy dispatcher gets here, too.
+bool Dispatcher::Impl::tryOthers() {
+  const bool hasResumed = bindings_.resume();
+  const bool hasActed = takeFrom(endpoint().nextOther()) || hasResumed;
   if (!parts_.timer.isDue()) return hasActed;
   bindings_.handleDue();
   return true;
 }
 
-bool Dispatcher::Impl::takeFrom(MaybeIndex index) {
-  if (!index) return false;
-  auto* const binding = parts_.linkOwners.find(*index);
-  // A binding that a callback removes stays alive until the next step.
-  return binding != nullptr && binding->takeSome(kBatch);
+// A binding that a callback removes stays alive until the next step.
+[[gnu::always_inline]] inline bool Dispatcher::Impl::takeFrom(Link* link) {
+  return link != nullptr && static_cast<Binding&>(link->user()).takeSome(kBatch);
 }
 
 void Dispatcher::Impl::interrupt() noexcept {

@@ -29,9 +29,9 @@ class Dispatcher::Impl {
   // Makes the calling thread the runner until the guard ends. A thread that already is the runner
   // stays it after that.
   //   throws  std::logic_error when another thread runs the dispatcher
-  [[nodiscard]] RunnerGuard becomeRunner() {
+  [[nodiscard, gnu::always_inline]] RunnerGuard becomeRunner() {
     endpoint().forkGuard().check("Dispatcher");
-    if (parts_.lock.tryEnter()) return RunnerGuard(&parts_.lock);
+    if (parts_.lock.tryEnter()) return RunnerGuard(&parts_.lock, true);
     if (parts_.lock.isMine()) return RunnerGuard(nullptr);
     if (hasThread_) RunnerLock::throwOtherRunner();
     return acquireLock();
@@ -68,7 +68,8 @@ class Dispatcher::Impl {
   bool takeStop() noexcept;
   bool step();
   bool tryStep();
-  bool takeFrom(MaybeIndex index);
+  bool tryOthers();
+  bool takeFrom(Link* link);
   void dropKnocks() noexcept;
   bool handleLocalHints();
 

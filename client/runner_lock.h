@@ -34,6 +34,8 @@ class RunnerLock {
   // Makes the calling thread the runner, if it has been the only one for a while and is not inside
   // by its bias already. Cheap. A thread that has the lock in another way may enter, too.
   [[nodiscard]] bool tryEnter() noexcept { return !bias_.isInside() && bias_.tryEnter(); }
+  // After tryEnter().
+  void leave() noexcept { bias_.leave(); }
 
   // Makes the calling thread, which does not own the lock, the runner.
   //   wakeOwner  makes a temporary owner call isRunnerWaiting()
@@ -49,7 +51,7 @@ class RunnerLock {
 
   // False when another thread owns the lock or waits in acquire().
   [[nodiscard]] bool tryAcquireTemporarily() noexcept;
-  [[gnu::always_inline]] void release() noexcept {
+  void release() noexcept {
     if (bias_.isMine()) bias_.leave();
     else releaseReal();
   }
@@ -112,15 +114,19 @@ class RunnerLock {
 // Releases `lock`, unless it is nullptr, at the end of the scope.
 class RunnerGuard {
  public:
-  explicit RunnerGuard(RunnerLock* lock) noexcept : lock_(lock) {}
+  //   hasEntered   by tryEnter(), which costs less to undo
+  explicit RunnerGuard(RunnerLock* lock, bool hasEntered = false) noexcept
+      : lock_(lock), hasEntered_(hasEntered) {}
   [[gnu::always_inline]] ~RunnerGuard() {
-    if (lock_ != nullptr) lock_->release();
+    if (hasEntered_) lock_->leave();
+    else if (lock_ != nullptr) lock_->release();
   }
   RunnerGuard(const RunnerGuard&) = delete;
   RunnerGuard& operator=(const RunnerGuard&) = delete;
 
  private:
   RunnerLock* lock_;
+  bool hasEntered_;
 };
 
 }  // namespace mpf

@@ -18,7 +18,7 @@
 
 namespace mpf {
 
-struct Connection {
+struct Connection final : LinkUser {
   struct GiveBack {
     void operator()(Connection* connection) const noexcept;
   };

@@ -50,6 +50,7 @@ Connection& Connections::add(std::uint32_t index, std::unique_ptr<Link> link) tr
   auto& connection = *all_[index];
   const auto incarnation = link->header().incarnation;
   std::vector<std::atomic<std::uint32_t>> unanswered(std::bit_ceil(link->maxOutstanding()));
+  link->setUser(connection);
   auto channel = MessageLink::make(std::move(link), connection.lock);
   byLink_[incarnation] = &connection;
   {

@@ -111,7 +111,6 @@ inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestI
 
 // Whether there is a request. If not, closes the connection if its client has closed the link.
 bool ServerCore::hasRequest(Connection& connection) noexcept {
-  if (!connection.channel) return false;
   if (connection.channel->hasMessage()) return true;
   connections_.closeIfClientDid(connection);
   return false;
@@ -172,10 +171,10 @@ Message ServerCore::receive() {
   endpoint_.forkGuard().check("MessageServer");
   // Limited, because faulty clients may set hints without end, and receive() must return.
   for (std::uint32_t looks = 0; looks < kMaxLooks; ++looks) {
-    auto index = endpoint_.nextPolled();
-    const bool isPolled{index};
-    if (!isPolled) index = nextOther();
-    if (!index) {
+    auto* link = endpoint_.nextPolled();
+    const bool isPolled = link != nullptr;
+    if (!isPolled) link = nextOther();
+    if (link == nullptr) {
       if (hasDescriptor_) {
         if (!endpoint_.arm()) continue;
         progress_.noteSleep();  // the caller sleeps at the descriptor
@@ -183,7 +182,7 @@ Message ServerCore::receive() {
       endHandling();
       return {};
     }
-    auto& connection = *connections_.all()[*index];
+    auto& connection = static_cast<Connection&>(link->user());
     if (!isPolled && !hasRequest(connection)) continue;
     Envelope envelope;
     if (!tryBegin(connection, envelope)) continue;
@@ -199,7 +198,7 @@ Message ServerCore::receive() {
 }
 
 // Handles control events and exceptions of client callbacks, then looks at the other links.
-MaybeIndex ServerCore::nextOther() {
+Link* ServerCore::nextOther() {
   replyCounts_.noteServerThread();
   if (endpoint_.hasControlEvents()) handleControlEvents();
   if (connections_.hasThrown()) throwNext();

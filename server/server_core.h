@@ -69,7 +69,7 @@ class ServerCore {
  private:
   void handleControlEvents();
   void throwNext();
-  MaybeIndex nextOther();
+  Link* nextOther();
   bool hasRequest(Connection& connection) noexcept;
   bool tryBegin(Connection& connection, Envelope& envelope) noexcept;
   Message finishShort(Connection& connection, const Envelope& envelope) noexcept;

@@ -83,26 +83,26 @@ void Endpoint::release(std::uint32_t index, Link& link) noexcept {
   window_.ring();
 }
 
-MaybeIndex Endpoint::nextOther() noexcept {
+Link* Endpoint::nextOther() noexcept {
   peers_.settle();
   if (polledLeft_ != 0) return nextReady();
   if (armed_) disarm();
-  if (const auto index = nextCold()) return index;
+  if (auto* const link = nextCold()) return link;
   return next();
 }
 
 // Returns the ready links, one by one. The round ends when the index wraps around; then the polled
 // links have kHintsEvery turns, or, if as many links are polled as may be, one each, so that a busy
 // link that is not polled waits no longer than that.
-MaybeIndex Endpoint::nextCold() noexcept {
+Link* Endpoint::nextCold() noexcept {
   const auto from = readyBits_.position();
-  const auto index = nextReady();
-  if (!index || *index < from)
+  auto* const link = nextReady();
+  if (link == nullptr || readyBits_.position() <= from)
     polledLeft_ = hot_.size() == HotLinks::kCapacity ? HotLinks::kCapacity : kHintsEvery;
-  return index;
+  return link;
 }
 
-MaybeIndex Endpoint::nextReady() noexcept {
+Link* Endpoint::nextReady() noexcept {
   if (revisit_) {
     if (isRevisitDue()) readyBits_.set(*revisit_);
     else if (isAttached(*revisit_)) links_[*revisit_]->incoming().onEmpty();
@@ -112,11 +112,11 @@ MaybeIndex Endpoint::nextReady() noexcept {
     sinceScan_ = 0;
     tryScanAllLinks();
   }
-  if (!readyBits_.hasAny()) return {};
+  if (!readyBits_.hasAny()) return nullptr;
   const auto index = readyBits_.tryTake([this](std::uint32_t of) { return isAttached(of); });
-  if (!index) return {};
+  if (!index) return nullptr;
   if (!hot_.tryAdd(*index, *links_[*index])) revisit_ = index;
-  return *index;
+  return links_[*index];
 }
 
 void Endpoint::interrupt() noexcept {

@@ -62,23 +62,23 @@ class Endpoint {
   void release(std::uint32_t index, Link& link) noexcept;
 
   // --- events ---
-  // Index of a link that may have a message or a change of state; nothing if there is no such link
-  // now. The caller takes one message of this link.
-  MaybeIndex next() noexcept {
-    if (const auto index = nextPolled()) return index;
+  // A link that may have a message or a change of state; nullptr if there is no such link now. The
+  // caller takes one message of this link.
+  Link* next() noexcept {
+    if (auto* const link = nextPolled()) return link;
     return nextOther();
   }
   // The two halves of next(). A link that nextPolled() returns has a message. It returns nothing
   // when no polled link has one, and after kHintsEvery turns. The caller then calls nextOther(); it
   // may handle control events before.
-  MaybeIndex nextPolled() noexcept {
-    if (polledLeft_ == 0) return {};
-    const auto index = hot_.next();
-    if (index) --polledLeft_;
-    return index;
+  [[gnu::always_inline]] Link* nextPolled() noexcept {
+    if (polledLeft_ == 0) return nullptr;
+    auto* const link = hot_.next();
+    if (link != nullptr) --polledLeft_;
+    return link;
   }
   // Also settles the windows of new peers.
-  MaybeIndex nextOther() noexcept;
+  Link* nextOther() noexcept;
   // Whether there may be an event that is not one of a link: a knock, a rescan or a local event.
   // Cheap: three loads.
   [[nodiscard]] bool hasControlEvents() const noexcept {
@@ -118,8 +118,8 @@ class Endpoint {
   [[nodiscard]] bool slept() const noexcept { return slept_; }
 
  private:
-  MaybeIndex nextReady() noexcept;
-  MaybeIndex nextCold() noexcept;
+  Link* nextReady() noexcept;
+  Link* nextCold() noexcept;
   [[nodiscard]] bool isAttached(std::uint32_t index) const noexcept {
     return index < links_.size() && links_[index] != nullptr;
   }

@@ -43,12 +43,12 @@ void HotLinks::noteEvents(const Hot& cooled) noexcept {
   else cooled.link->incoming().onEmpty();
 }
 
-MaybeIndex HotLinks::cool(std::size_t place) noexcept {
+Link* HotLinks::cool(std::size_t place) noexcept {
   const auto cooled = hot_[place];
   hot_[place] = hot_[--size_];
   Link::execute(cooled.link->unwatch());
   noteEvents(cooled);
-  return cooled.link->incoming().hasMessage() ? cooled.index : MaybeIndex();
+  return cooled.link->incoming().hasMessage() ? cooled.link : nullptr;
 }
 
 }  // namespace mpf

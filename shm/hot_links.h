@@ -12,7 +12,6 @@
 #include <cstdint>
 
 #include "shm/link.h"
-#include "shm/maybe_index.h"
 #include "shm/ready_bits.h"
 
 namespace mpf {
@@ -47,17 +46,17 @@ class HotLinks {
     }
     return false;
   }
-  // Index of the next polled link that has a message; links take turns. Nothing if it finds none.
+  // The next polled link that has a message; links take turns. nullptr if it finds none.
   // Frees the slots of a link when it finds no message there for the first time. Ends the polling
   // of a link that is idle for long, and then returns although others may have messages.
-  MaybeIndex next() noexcept {
+  [[gnu::always_inline]] Link* next() noexcept {
     for (auto looks = size_; looks != 0; --looks) {
       if (++turn_ >= hot_.data() + size_) turn_ = hot_.data();
       auto& hot = *turn_;
       if (hot.link->incoming().hasMessage()) {
         hot.misses = 0;
         if (++hot.turns == kUnfencedAfter) hot.link->letPeerSendUnfenced();
-        return hot.index;
+        return hot.link;
       }
       if (++hot.misses == 1) hot.link->incoming().onEmpty();
       if (hot.misses >= kCoolAfter) return cool(static_cast<std::size_t>(turn_ - hot_.data()));
@@ -72,8 +71,8 @@ class HotLinks {
     std::uint32_t turns;  // polls with a message
     Link* link;
   };
-  // Stops polling the link at `place`; returns its index if a message has arrived.
-  MaybeIndex cool(std::size_t place) noexcept;
+  // Stops polling the link at `place`; returns it if a message has arrived.
+  Link* cool(std::size_t place) noexcept;
   // Sets the ready bit if the link has an event; otherwise frees the slots of the messages taken.
   void noteEvents(const Hot& cooled) noexcept;
 

@@ -56,6 +56,12 @@ struct LinkGeometry {
   static LinkGeometry forQueue(std::uint32_t queueSize) noexcept;
 };
 
+// Takes the messages of links. An endpoint returns links; each tells whose it is.
+class LinkUser {
+ protected:
+  ~LinkUser() = default;
+};
+
 class Link {
  public:
   // Creates a link from our window to `server`, which has not accepted it yet. `index` is the
@@ -88,6 +94,10 @@ class Link {
   [[nodiscard]] const std::shared_ptr<PeerWindow>& peer() const noexcept { return peer_; }
   void attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept;
   void setPeerIndex(std::uint32_t peerIndex) noexcept { peerIndex_ = peerIndex; }
+
+  // The user of this side: set before the link is attached to an endpoint.
+  void setUser(LinkUser& user) noexcept { user_ = &user; }
+  [[nodiscard]] LinkUser& user() const noexcept { return *user_; }
 
   // Whether the file of the link was truncated: its contents are lost.
   [[nodiscard]] bool isLost() const noexcept { return segment_.isLost(); }
@@ -248,6 +258,7 @@ class Link {
   LinkGeometry geometry_;
   std::string backplane_;
   LinkSide side_;
+  LinkUser* user_ = nullptr;
   std::shared_ptr<PeerWindow> peer_;
   std::uint32_t peerIndex_ = 0;
   std::uint64_t maxMessageBytes_;

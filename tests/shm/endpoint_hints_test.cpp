@@ -39,8 +39,8 @@ class HintsTest : public ShmTest {
   // The next message of any link; waits without a limit.
   static std::uint32_t take(End& end) {
     for (;;) {
-      if (const auto index = end.endpoint.next()) {
-        if (const auto id = end.tryTake(*index)) return *id;
+      if (auto* const ready = end.endpoint.next()) {
+        if (const auto id = End::tryTake(*ready)) return *id;
         continue;
       }
       while (end.endpoint.knocks().tryTake()) {
@@ -105,8 +105,8 @@ TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutAHint) {
 
   for (bool found = false; !found;) {
     static_cast<void>(send(flood.client, 1));
-    const auto index = server.endpoint.next();
-    found = index && server.tryTake(*index) == 7u;
+    auto* const ready = server.endpoint.next();
+    found = ready != nullptr && End::tryTake(*ready) == 7u;
   }
 }
 
@@ -120,8 +120,8 @@ TEST_F(HintsTest, AnEventLoopIsNotifiedOfAMessageWithoutAHint) {
 
   EXPECT_FALSE(server.endpoint.arm());
 
-  ASSERT_EQ(server.endpoint.next(), link.serverIndex);
-  EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
+  ASSERT_EQ(server.endpoint.next(), &link.server);
+  EXPECT_EQ(End::tryTake(link.server), 7u);
 }
 
 TEST_F(HintsTest, HintsWithoutAMessageDoNoHarm) {
@@ -136,7 +136,7 @@ TEST_F(HintsTest, HintsWithoutAMessageDoNoHarm) {
   std::uint32_t sum = 0;
   std::uint32_t knocks = 0;
   for (std::uint32_t looks = 0; looks < 2 * layout::kMaxLinks; ++looks) {
-    if (const auto index = server.endpoint.next()) sum += server.tryTake(*index).value_or(0);
+    if (auto* const ready = server.endpoint.next()) sum += End::tryTake(*ready).value_or(0);
   }
   while (server.endpoint.knocks().tryTake()) ++knocks;
 

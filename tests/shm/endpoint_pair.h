@@ -55,8 +55,7 @@ struct End {
     return *links[index];
   }
   // A value for Envelope, for tests that check only one word.
-  std::optional<std::uint32_t> tryTake(std::uint32_t index) {
-    auto& link = *links[index];
+  static std::optional<std::uint32_t> tryTake(Link& link) {
     if (!link.incoming().hasMessage()) return std::nullopt;
     const auto id = link.incoming().begin().requestId;
     link.incoming().end();

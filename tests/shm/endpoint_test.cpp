@@ -23,8 +23,10 @@ class EndpointTest : public ShmTest {
     std::vector<int> taken(links.size());
     for (int i = 0; i < messages; ++i) {
       for (const auto& link : links) static_cast<void>(send(link.client, 1));
-      const auto index = end.endpoint.next();
-      if (index && end.tryTake(*index)) ++taken[*index];
+      auto* const ready = end.endpoint.next();
+      if (ready == nullptr || !End::tryTake(*ready)) continue;
+      ++taken[static_cast<std::size_t>(
+          std::ranges::find(end.links, ready, &std::unique_ptr<Link>::get) - end.links.begin())];
     }
     return taken;
   }
@@ -45,9 +47,8 @@ TEST_P(WaitModes, AWaitEndsWithAMessage) {
   sender.join();
 
   EXPECT_TRUE(hasEvent);
-  const auto index = server.endpoint.next();
-  ASSERT_EQ(index, link.serverIndex);
-  EXPECT_EQ(server.tryTake(*index), 7u);
+  ASSERT_EQ(server.endpoint.next(), &link.server);
+  EXPECT_EQ(End::tryTake(link.server), 7u);
 }
 
 TEST_P(WaitModes, AWaitWithoutAMessageEndsAtItsDeadline) {
@@ -113,8 +114,8 @@ TEST_P(WaitModes, ThousandsOfTurnsLoseNoWakeUp) {
   const auto link = connect(client, server);
   const auto takeNext = [](End& end) {
     for (;;) {
-      if (const auto index = end.endpoint.next()) {
-        if (const auto id = end.tryTake(*index)) return *id;
+      if (auto* const ready = end.endpoint.next()) {
+        if (const auto id = End::tryTake(*ready)) return *id;
         continue;
       }
       EXPECT_TRUE(end.endpoint.wait(Deadline::never()));
@@ -173,7 +174,7 @@ TEST_F(EndpointTest, AWaitBeforeEachMessageReturnsForEveryMessage) {
 
   for (std::uint32_t taken = 0; taken < 5;) {
     ASSERT_TRUE(server.endpoint.wait(Deadline::never()));
-    if (const auto index = server.endpoint.next(); index && server.tryTake(*index)) ++taken;
+    if (auto* const ready = server.endpoint.next(); ready && End::tryTake(*ready)) ++taken;
   }
 }
 
@@ -188,10 +189,10 @@ TEST_F(EndpointTest, AFloodOnOneLinkDoesNotStarveOthers) {
   int others = 0;
   for (bool found = false; !found;) {
     static_cast<void>(send(flood.client, 1));
-    const auto index = server.endpoint.next();
-    ASSERT_TRUE(index);
-    const auto id = server.tryTake(*index);
-    found = id && *index == quiet.serverIndex;
+    auto* const ready = server.endpoint.next();
+    ASSERT_NE(ready, nullptr);
+    const auto id = End::tryTake(*ready);
+    found = id && ready == &quiet.server;
     if (id && !found) ++others;
   }
 
@@ -212,7 +213,7 @@ TEST_F(EndpointTest, BusyLinksDoNotStarveALinkWithAHighIndex) {
   const auto taken = [&] { return quiet.server.incoming().messages() != 0; };
   for (int turns = 0; turns < 1000 && !taken(); ++turns) {
     for (const auto& link : links) static_cast<void>(send(link.client, 1));
-    if (const auto index = server.endpoint.next()) server.tryTake(*index);
+    if (auto* const ready = server.endpoint.next()) End::tryTake(*ready);
   }
 
   EXPECT_TRUE(taken());
@@ -242,8 +243,8 @@ TEST_F(EndpointTest, ReusesTheBitOfADetachedLink) {
 
   EXPECT_EQ(second.serverIndex, first.serverIndex);
   ASSERT_EQ(send(second.client, 2), LinkSend::sent);
-  ASSERT_EQ(server.endpoint.next(), second.serverIndex);
-  EXPECT_EQ(server.tryTake(second.serverIndex), 2u);
+  ASSERT_EQ(server.endpoint.next(), &second.server);
+  EXPECT_EQ(End::tryTake(second.server), 2u);
   EXPECT_EQ(server.endpoint.control().linkCount.load(std::memory_order_relaxed), 1u);
 }
 
@@ -321,8 +322,8 @@ TEST_F(EndpointTest, DescriptorIsReadableWhenAMessageArrives) {
 
   EXPECT_TRUE(isReadable());
   EXPECT_FALSE(server.endpoint.arm()) << "there is a message already";
-  ASSERT_EQ(server.endpoint.next(), link.serverIndex);
-  EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
+  ASSERT_EQ(server.endpoint.next(), &link.server);
+  EXPECT_EQ(End::tryTake(link.server), 7u);
   while (server.endpoint.next()) {
   }
   ASSERT_TRUE(server.endpoint.arm());
@@ -341,8 +342,8 @@ TEST_F(EndpointTest, AnEndpointThatIsPolledNeedsNoWakeUp) {
     return ::poll(&poll, 1, 0) == 1;
   };
   const auto take = [&] {
-    ASSERT_EQ(server.endpoint.next(), link.serverIndex);
-    EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
+    ASSERT_EQ(server.endpoint.next(), &link.server);
+    EXPECT_EQ(End::tryTake(link.server), 7u);
     while (server.endpoint.next()) {
     }
   };
@@ -374,8 +375,8 @@ TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUps) {
   const auto link = connect(client, server);
   const auto takeNext = [](End& end) {
     for (;;) {
-      while (const auto index = end.endpoint.next()) {
-        if (const auto id = end.tryTake(*index)) return *id;
+      while (auto* const ready = end.endpoint.next()) {
+        if (const auto id = End::tryTake(*ready)) return *id;
       }
       if (!end.endpoint.arm()) continue;
       pollfd poll{end.endpoint.descriptor(), POLLIN, 0};
