@@ -33,10 +33,13 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
       : parts_(parts), callback_(std::move(callback)) {}
 
   // --- any thread ---
-  // As RequestSender::send().
-  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
-                  Retry retry = Retry::never) noexcept {
+  // As the functions of RequestSender.
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t* requestId,
+                  Retry retry) noexcept {
     return sender_.send(message, takeBefore, requestId, retry);
+  }
+  SendResult sendAs(std::uint32_t requestId, Message& message, Deadline takeBefore) noexcept {
+    return sender_.sendAs(requestId, message, takeBefore);
   }
   SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
                     std::span<std::uint32_t> requestIds) noexcept {

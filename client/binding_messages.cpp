@@ -105,7 +105,7 @@ void Binding::dropReply(BodyFields fields, Request* request) {
   return true;
 }
 
-inline void Binding::endRequest(Request& request) {
+[[gnu::always_inline]] inline void Binding::endRequest(Request& request) {
   sender_.requests()->end(request);
   MPF_STEP(request_ended);
   showAnswered();

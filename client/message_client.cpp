@@ -62,10 +62,7 @@ void MessageClient::bind(const std::string& server, std::int32_t location) {
 SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId,
                                Retry retry) noexcept {
   if (isInherited()) return SendResult::notConnected;
-  std::uint32_t id = 0;
-  const auto result = binding_->send(message, takeBefore, id, retry);
-  if (requestId != nullptr && result == SendResult::sent) *requestId = id;
-  return result;
+  return binding_->send(message, takeBefore, requestId, retry);
 }
 
 SentMany MessageClient::sendMany(std::span<Message> messages, Deadline takeBefore,

@@ -8,7 +8,7 @@ namespace mpf {
 SendResult RelayClient::sendAs(std::uint32_t requestId, Message&& message,
                                Deadline takeBefore) noexcept {
   if (isInherited()) return SendResult::notConnected;
-  return binding_->send(message, takeBefore, requestId);
+  return binding_->sendAs(requestId, message, takeBefore);
 }
 
 void RelayClient::pause() { binding_->pause(); }

@@ -68,16 +68,8 @@ SendResult RequestSender::tryAllowMore() noexcept {
   while ((request = requests_->tryReserve(id)) == nullptr) {
     if (const auto refusal = tryAllowMore(); refusal != SendResult::sent) return refusal;
   }
-  const Envelope envelope{
-      .type = static_cast<std::uint16_t>(message.getType()),
-      .requestId = id,
-      .clientType = message.getClientType(),
-      .clientExtra = message.getClientExtra(),
-      .sentTick = Tick::ofSample(sentNs),
-      .timeNs = deadlineNs,
-  };
-  request->clientType = envelope.clientType;
-  request->clientExtra = envelope.clientExtra;
+  request->clientType = message.getClientType();
+  request->clientExtra = message.getClientExtra();
   request->ordinal = link.outgoing().messages() + 1;
   request->deadlineNs = deadlineNs;
   request->sentNs = sentNs;
@@ -86,6 +78,16 @@ SendResult RequestSender::tryAllowMore() noexcept {
   // trySendLocked() of the channel returns.
   requests_->add(*request, id);
   MPF_STEP(request_added);
+  const auto envelope = [&] {
+    return Envelope{
+        .type = static_cast<std::uint16_t>(message.getType()),
+        .requestId = id,
+        .clientType = message.getClientType(),
+        .clientExtra = message.getClientExtra(),
+        .sentTick = Tick::ofSample(sentNs),
+        .timeNs = deadlineNs,
+    };
+  };
   const auto sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0});
   if (sent != LinkSend::sent && sent != LinkSend::sentInPlace)
     return takeBack(*request, resultOf(sent), copy);
@@ -112,21 +114,45 @@ SendResult RequestSender::refuseBehindUntaken() noexcept {
   return SendResult::queueFull;
 }
 
-SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
+SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint32_t* requestId,
                                Retry retry) noexcept {
   if (!message) return SendResult::empty;
   if (retry != Retry::never) return sendWithCopy(message, nsOf(takeBefore), requestId);
-  return send(message, nsOf(takeBefore), requestId, nullptr, Turn::last);
+  std::uint32_t id = 0;
+  const auto result = sendInTurn(message, nsOf(takeBefore), id, nullptr, Turn::last);
+  if (requestId != nullptr && result == SendResult::sent) *requestId = id;
+  return result;
+}
+
+SendResult RequestSender::sendAs(std::uint32_t requestId, Message& message,
+                                 Deadline takeBefore) noexcept {
+  if (!message) return SendResult::empty;
+  return sendRarely(message, nsOf(takeBefore), requestId, nullptr, Turn::last);
 }
 
 SendResult RequestSender::sendWithCopy(Message& message, std::int64_t deadlineNs,
-                                       std::uint32_t& requestId) noexcept {
+                                       std::uint32_t* requestId) noexcept {
   auto copy = tryCopy(message);
-  return copy ? send(message, deadlineNs, requestId, &copy, Turn::last) : SendResult::noMemory;
+  if (!copy) return SendResult::noMemory;
+  std::uint32_t id = 0;
+  const auto result = sendRarely(message, deadlineNs, id, &copy, Turn::last);
+  if (requestId != nullptr && result == SendResult::sent) *requestId = id;
+  return result;
 }
 
-SendResult RequestSender::send(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
-                               std::unique_ptr<Message>* copy, Turn turn) noexcept {
+// Not inline, so that the path of most requests is short.
+[[gnu::noinline]] SendResult RequestSender::sendRarely(Message& message, std::int64_t deadlineNs,
+                                                       std::uint32_t& requestId,
+                                                       std::unique_ptr<Message>* copy,
+                                                       Turn turn) noexcept {
+  return sendInTurn(message, deadlineNs, requestId, copy, turn);
+}
+
+[[gnu::always_inline]] inline SendResult RequestSender::sendInTurn(Message& message,
+                                                                   std::int64_t deadlineNs,
+                                                                   std::uint32_t& requestId,
+                                                                   std::unique_ptr<Message>* copy,
+                                                                   Turn turn) noexcept {
   bool startsNudging = false;
   {
     const BiasedLock::Guard lock(*lock_);
@@ -187,7 +213,7 @@ SendResult RequestSender::trySendUntaken() {
   auto message = untaken_.front().message->duplicate();
   auto& next = untaken_.front();
   auto id = next.id;
-  return send(message, next.deadlineNs, id, &next.message, Turn::firstUntaken);
+  return sendRarely(message, next.deadlineNs, id, &next.message, Turn::firstUntaken);
 }
 
 // Counts each refusal, and reports a series of them once, in its place among the other messages.

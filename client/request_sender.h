@@ -34,10 +34,11 @@ class RequestSender {
         timer_(timer),
         postFullReport_(std::move(postFullReport)) {}
 
-  //   requestId   in: the id for the request, or 0 for a new one; out: its id when it was sent
-  //   retry       as MessageClient::send()
-  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
+  // As MessageClient::send(), but leaves a message that was not sent where it is.
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t* requestId,
                   Retry retry) noexcept;
+  // As RelayClient::sendAs().
+  SendResult sendAs(std::uint32_t requestId, Message& message, Deadline takeBefore) noexcept;
   // As MessageClient::sendMany().
   SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
                     std::span<std::uint32_t> requestIds) noexcept;
@@ -73,14 +74,16 @@ class RequestSender {
  private:
   // last: behind the requests that were kept; firstUntaken: the first one of those.
   enum class Turn { last, firstUntaken };
-  //   requestId   in: 0 for a new one; out: the id of a request that was sent
+  //   requestId   in: the id for the request, or 0 for a new one; out: its id when it was sent
   //   copy        nullptr, or a copy to keep until the request is taken; moved from if it was sent
-  SendResult send(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
-                  std::unique_ptr<Message>* copy, Turn turn) noexcept;
+  SendResult sendInTurn(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
+                        std::unique_ptr<Message>* copy, Turn turn) noexcept;
+  SendResult sendRarely(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
+                        std::unique_ptr<Message>* copy, Turn turn) noexcept;
   SendResult trySendLocked(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
                            std::unique_ptr<Message>* copy) noexcept;
   SendResult sendWithCopy(Message& message, std::int64_t deadlineNs,
-                          std::uint32_t& requestId) noexcept;
+                          std::uint32_t* requestId) noexcept;
   SendResult tryAllowMore() noexcept;
   SendResult takeBack(Request& request, SendResult result, std::unique_ptr<Message>* copy) noexcept;
   void setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept;

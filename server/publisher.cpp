@@ -154,7 +154,7 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   if (stamps_ && envelope.timeNs == 0) envelope.timeNs = Clock::wallNs();
   envelope.sentTick = Tick::ofSample(link.timeOfNext());
 
-  const Link::Limits limits{0, first ? 0 : link.maxOutstanding()};
+  const Link::Limits limits{0, first ? 0 : link.slotsOfFirstReplies()};
   const auto bytes = message.body().size();
   const auto result =
       missed ? link.tryRelayFanOut(envelope, chunk, bytes, limits, maxBorrowed_, *missed)

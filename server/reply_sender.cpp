@@ -2,6 +2,7 @@
 #include "server/reply_sender.h"
 
 #include <memory>
+#include <utility>
 
 #include <mpf/clock.h>
 
@@ -46,15 +47,14 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const Link::Batch batch(link);
   const auto sentBefore = link.outgoing().messages();
   RepliedMany sent;
-  const auto client = route.link;
+  const auto [client, generation] = std::pair(route.link, route.flags);
   for (auto& message : messages) {
-    if (message.route().link != client || !connection.isOpenFor(message.route())) break;
+    if (message.route().link != client || message.route().flags != generation) break;
     if (message) sent.result = sendLocked(connection, message);
     if (sent.result != ReplyResult::sent) break;
     ++sent.count;
   }
-  if (const auto number = link.outgoing().messages() - sentBefore; number != 0)
-    counts_.sent(number);
+  if (const auto number = link.outgoing().messages() - sentBefore; number != 0) count(link, number);
   return sent;
 }
 
@@ -62,43 +62,48 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
                                                                      Message& message) noexcept {
   if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
   const auto result = sendLocked(connection, message);
-  if (result == ReplyResult::sent) counts_.sent();
+  if (result == ReplyResult::sent) count(connection.channel->link(), 1);
   return result;
 }
 
-// Inline, so that the envelope stays in registers.
+[[gnu::always_inline]] inline void ReplySender::count(Link& link, std::uint64_t replies) noexcept {
+  link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
+  counts_.sent(replies);
+}
+
+// Inline, because it is on the path of each message.
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendLocked(Connection& connection,
                                                                   Message& message) noexcept {
   auto& link = connection.channel->link();
   // First: values that were computed before a call would have to be saved on the stack.
   const auto sentNs = link.timeOfNext();
+  if (stamps_ && message.getTimeStampNs() == 0) message.setTimeStampNs(Clock::wallNs());
   const auto requestId = message.route().requestId;
   const bool isFirst = connection.owes(requestId);
-  const auto timeNs = message.getTimeStampNs();
-  const Envelope envelope{
-      .type = static_cast<std::uint16_t>(message.getType()),
-      .flags = isFirst ? layout::kSlotFirstReply : std::uint8_t{0},
-      .requestId = requestId,
-      .clientType = message.getClientType(),
-      .clientExtra = message.getClientExtra(),
-      .sentTick = Tick::ofSample(sentNs),
-      .timeNs = stamps_ && timeNs == 0 ? Clock::wallNs() : timeNs,
+  const auto envelope = [&] {
+    return Envelope{
+        .type = static_cast<std::uint16_t>(message.getType()),
+        .flags = isFirst ? layout::kSlotFirstReply : std::uint8_t{0},
+        .requestId = requestId,
+        .clientType = message.getClientType(),
+        .clientExtra = message.getClientExtra(),
+        .sentTick = Tick::ofSample(sentNs),
+        .timeNs = message.getTimeStampNs(),
+    };
   };
-  const auto reserve = isFirst ? 0 : link.maxOutstanding();
+  const auto reserve = isFirst ? 0 : link.slotsOfFirstReplies();
   const auto result = connection.channel->trySendLocked(envelope, message, {0, reserve});
   if (result != LinkSend::sent && result != LinkSend::sentInPlace) return noteRefused(result);
   MPF_STEP(reply_sent);
-  link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
-  if (isFirst) noteReplied(connection, message);
+  if (!isFirst) return ReplyResult::sent;
+  static_cast<void>(message.exchangeKeeper(nullptr));
+  connection.owed(requestId).store(0, std::memory_order_relaxed);
+  if (requestId == connection.timedId) noteServiceTime(connection);
   return ReplyResult::sent;
 }
 
-// After the first reply to a request.
-void ReplySender::noteReplied(Connection& connection, Message& message) noexcept {
-  static_cast<void>(message.exchangeKeeper(nullptr));
-  const auto requestId = message.route().requestId;
-  connection.owed(requestId).store(0, std::memory_order_relaxed);
-  if (requestId != connection.timedId) return;
+// After the first reply to the request that is timed.
+void ReplySender::noteServiceTime(Connection& connection) noexcept {
   counts_.service(Clock::nowNs() - connection.timedFromNs);
   connection.timedId = 0;
 }

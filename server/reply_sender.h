@@ -40,9 +40,11 @@ class ReplySender {
   static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
+  // Counts what was sent on a link.
+  void count(Link& link, std::uint64_t replies) noexcept;
   // The caller counts what was sent.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
-  void noteReplied(Connection& connection, Message& message) noexcept;
+  void noteServiceTime(Connection& connection) noexcept;
   ReplyResult noteRefused(LinkSend result) noexcept;
 
   ForkGuard forkGuard_;

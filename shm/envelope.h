@@ -21,7 +21,9 @@ struct Tick {
   }
   // The tick of a message that is sent at this time; 0 if `ns` is 0: the message is not timed.
   [[nodiscard]] static std::uint32_t ofSample(std::int64_t ns) noexcept {
-    return ns != 0 ? of(ns) : 0;
+    if (ns == 0) [[likely]]
+      return 0;
+    return of(ns);
   }
   [[nodiscard]] static std::int64_t nsSince(std::uint32_t tick, std::int64_t nowNs) noexcept {
     return static_cast<std::int64_t>(of(nowNs) - tick) * 16;

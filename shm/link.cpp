@@ -85,8 +85,9 @@ LinkGeometry LinkGeometry::forQueue(std::uint32_t queueSize) noexcept {
   // Most clients have few unanswered requests: they need a quarter of this.
   constexpr std::uint32_t kLeastSlots = 64;
   const auto first = std::max(kLeastSlots, replySlots / 4);
-  if (first >= replySlots) return {ringSlotsFor(queueSize), replySlots, 0, maxOutstanding};
-  return {ringSlotsFor(queueSize), first, replySlots, maxOutstanding};
+  if (first >= replySlots)
+    return {ringSlotsFor(queueSize), replySlots, 0, maxOutstanding, maxOutstanding};
+  return {ringSlotsFor(queueSize), first, replySlots, maxOutstanding, first / 4};
 }
 
 Rights Link::rightsAt(const PeerWindow& server) {
@@ -260,7 +261,7 @@ bool Link::trySendInSlots(const Envelope& envelope, std::span<const std::byte> b
   // only the slots beyond these.
   const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
   const auto queueLeft = waiting > queued + 1 ? waiting - queued - 1 : 0;
-  const auto needed = std::max(side_ == LinkSide::server ? maxOutstanding() : 0, queueLeft);
+  const auto needed = std::max(side_ == LinkSide::server ? slotsOfFirstReplies() : 0, queueLeft);
   auto sized = envelope;
   sized.bodyBytes = static_cast<std::uint32_t>(body.size());
   if (!out_.tryPush(sized, body, needed)) return false;
@@ -276,7 +277,8 @@ bool Link::trySendRef(const Envelope& envelope, std::size_t bodyBytes, const lay
   const std::array<std::uint32_t, layout::kFirstSlotBodyBytes / 4> body{ref.segment, ref.chunk,
                                                                         ref.side, ref.missed};
   const auto bytes = static_cast<std::uint32_t>(bodyBytes);
-  if (!out_.tryPushShort(marked, bytes, std::as_bytes(std::span(body)), reserve)) return false;
+  if (!out_.tryPushShort([&] { return marked; }, bytes, std::as_bytes(std::span(body)), reserve))
+    return false;
   afterPush();
   return true;
 }
@@ -314,6 +316,7 @@ void Link::endFanOut() noexcept {
 }
 
 void Link::afterFencedPush() noexcept {
+  untimedUntil_ = 0;  // from now on, the sampler may decide
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
   if (!peer_ || outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched) return;
@@ -322,9 +325,20 @@ void Link::afterFencedPush() noexcept {
   NoticeBatch::notify(peer_, peerIndex_, room / 2);
 }
 
-std::int64_t Link::takeSample() noexcept {
+// The next message is timed if its number is a multiple of kMaxInterval, or, if the peer does not
+// poll, when the sampler says so.
+std::int64_t Link::timeIfDue() noexcept {
+  constexpr auto kInterval = TimeSampler::kMaxInterval;
+  const auto sent = out_.messages();
+  const auto watch = outWatch_.load(std::memory_order_relaxed);
+  const bool isDue =
+      watch == layout::Watch::unwatched ? sampler_.isDue(sent) : sent % kInterval == 0;
+  if (!isDue) {
+    if (watch == layout::Watch::polledUnfenced) untimedUntil_ = (sent / kInterval + 1) * kInterval;
+    return 0;
+  }
   const auto nowNs = Clock::nowNs();
-  sampler_.note(out_.messages(), nowNs);
+  sampler_.note(sent, nowNs);
   return nowNs;
 }
 

@@ -49,9 +49,7 @@ struct LinkGeometry {
   std::uint32_t moreReplySlots;  // 0: the first reply ring is large enough
   std::uint32_t maxOutstanding;
   // Requests that may be unanswered while the second reply ring has no memory.
-  [[nodiscard]] std::uint32_t firstOutstanding() const noexcept {
-    return moreReplySlots == 0 ? maxOutstanding : replySlots / 4;
-  }
+  std::uint32_t firstOutstanding;
   [[nodiscard]] std::uint32_t allReplySlots() const noexcept { return replySlots + moreReplySlots; }
   static LinkGeometry forQueue(std::uint32_t queueSize) noexcept;
 };
@@ -111,12 +109,17 @@ class Link {
   // that it has not taken yet. The client removes the names. Returns false if the client's user has
   // no right to remove them.
   [[nodiscard]] bool tryLeavePoolToClient() noexcept;
-  // Requests that may be unanswered now. The server leaves as many slots free for first replies.
+  // Requests that may be unanswered now.
   [[nodiscard]] std::uint32_t maxOutstanding() const noexcept {
     // PAIR(second-ring): the client has reserved the memory.
     return control().hasMoreReplies.load(std::memory_order_acquire) == 0
-               ? geometry_.firstOutstanding()
+               ? geometry_.firstOutstanding
                : geometry_.maxOutstanding;
+  }
+  // At the server: slots to leave free for first replies in the ring that is in use. When the first
+  // ring is full, there is no more to answer, or there is memory for the second one.
+  [[nodiscard]] std::uint32_t slotsOfFirstReplies() const noexcept {
+    return out_.canMove() ? geometry_.firstOutstanding : geometry_.maxOutstanding;
   }
   // At the client: lets geometry().maxOutstanding requests be unanswered. Returns false if there is
   // no memory for their replies.
@@ -132,22 +135,26 @@ class Link {
     // replies, or its body goes into a chunk
     std::uint32_t reserve = 0;
   };
-  // Sends a body; sets its length and flags in the envelope. A short body is copied into slots of
-  // the ring. If a longer body is in a chunk already (our own or a borrowed one), the peer gets
-  // this chunk; otherwise the body is copied into a new chunk. Inline, so that the envelope stays
-  // in registers.
-  [[gnu::always_inline]] LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
-                                          Limits limits) noexcept {
+  // Sends a body; sets its length and flags in the envelope that `envelope()` returns. A short body
+  // is copied into slots of the ring. If a longer body is in a chunk already (our own or a borrowed
+  // one), the peer gets this chunk; otherwise the body is copied into a new chunk.
+  template <class MakeEnvelope>
+  [[gnu::always_inline]] LinkSend trySend(const MakeEnvelope& envelope,
+                                          std::span<const std::byte> body, Limits limits) noexcept {
     if (body.size() > maxMessageBytes_) return LinkSend::tooLarge;
     if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting &&
         out_.waiting() >= limits.waiting)
       return LinkSend::full;
     if (body.size() > layout::kFirstSlotBodyBytes)
-      return trySendLong(envelope, body, limits.waiting, limits.reserve);
+      return trySendLong(envelope(), body, limits.waiting, limits.reserve);
     const auto bytes = static_cast<std::uint32_t>(body.size());
     if (!out_.tryPushShort(envelope, bytes, body, limits.reserve)) return LinkSend::full;
     afterPush();
     return LinkSend::sent;
+  }
+  LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
+                   Limits limits) noexcept {
+    return trySend([&] { return envelope; }, body, limits);
   }
   // While it exists, messages are sent without a notice to the peer; at its end, one notice stands
   // for all of them.
@@ -186,11 +193,7 @@ class Link {
   // The time now if the next message is to be timed (Envelope::sentTick), otherwise 0. For each
   // attempt to send.
   [[nodiscard]] std::int64_t timeOfNext() noexcept {
-    const auto sent = out_.messages();
-    const bool isDue = outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched
-                           ? sampler_.isDue(sent)
-                           : sent % TimeSampler::kMaxInterval == 0;
-    return isDue ? takeSample() : 0;
+    return out_.messages() < untimedUntil_ ? 0 : timeIfDue();
   }
   // The ring that trySend() fills; it counts the messages that were sent, and those that the peer
   // has taken.
@@ -250,7 +253,7 @@ class Link {
       afterFencedPush();
   }
   void afterFencedPush() noexcept;
-  std::int64_t takeSample() noexcept;  // reads the clock for the next message
+  std::int64_t timeIfDue() noexcept;
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
 
   ForkGuard forkGuard_;
@@ -268,6 +271,7 @@ class Link {
   bool isInBatch_ = false;  // the end of the batch notifies the peer
   RingProducer out_;
   TimeSampler sampler_;  // of outgoing messages
+  std::uint64_t untimedUntil_ = 0;  // messages sent before the next one that may be timed
   RingConsumer in_;
   PoolOwner pool_;
   bool leavesPool_ = false;

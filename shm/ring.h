@@ -66,8 +66,7 @@ class RingProducer {
   RingProducer(layout::Slot* slots, std::uint32_t capacity, const layout::RingControl& consumer,
                const SecondRing& second = {}, const RingConsumer* incoming = nullptr) noexcept
       : slots_(slots),
-        capacity_(capacity),
-        usable_(second.slots == nullptr ? capacity : capacity - 1),
+        mask_(capacity - 1),
         consumer_(consumer),
         second_(second),
         incoming_(incoming) {}
@@ -84,16 +83,17 @@ class RingProducer {
     publish(first, count);
     return true;
   }
-  // As tryPush(), for a body of at most layout::kFirstSlotBodyBytes; `bodyBytes` takes the place of
-  // envelope.bodyBytes. Inline, so that the envelope stays in registers.
-  [[nodiscard, gnu::always_inline]] bool tryPushShort(const Envelope& envelope,
+  // As tryPush(), for a body of at most layout::kFirstSlotBodyBytes. Calls `envelope()` after the
+  // checks, so that its values need no places on the stack meanwhile.
+  template <class MakeEnvelope>
+  [[nodiscard, gnu::always_inline]] bool tryPushShort(const MakeEnvelope& envelope,
                                                       std::uint32_t bodyBytes,
                                                       std::span<const std::byte> body,
                                                       std::uint32_t reserve) noexcept {
     if (!hasFree(1 + reserve)) return false;
     if (pushed_ >= claimed_) claimLines();
     auto& first = slot(pushed_);
-    write(first, envelope, 1, bodyBytes);
+    write(first, envelope(), 1, bodyBytes);
     if (body.size() == layout::kFirstSlotBodyBytes) [[likely]]
       detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     else if (!body.empty()) std::memcpy(first.body.data(), body.data(), body.size());
@@ -115,8 +115,10 @@ class RingProducer {
     return messages_ - waiting() >= ordinal;
   }
 
+  // Whether there is a second ring, to which we have not moved.
+  [[nodiscard]] bool canMove() const noexcept { return second_.slots != nullptr; }
   [[nodiscard]] bool hasFree(std::uint32_t count) noexcept {
-    return pushed_ + count - freedSeen_ <= usable_ || hasFreed(count);
+    return pushed_ + count <= freeEnd_ || hasFreed(count);
   }
 
  private:
@@ -129,17 +131,17 @@ class RingProducer {
   // Whether this side was idle before nearly each of the messages since the last call.
   [[nodiscard]] bool isOneByOne() noexcept;
 
-  layout::Slot& slot(std::uint64_t position) const noexcept {
-    return slots_[position & (capacity_ - 1)];
-  }
+  layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & mask_]; }
 
   // Whether the consumer has freed enough since we looked last, or there is room elsewhere.
   [[gnu::noinline]] bool hasFreed(std::uint32_t count) noexcept {
     // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
-    freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
-    claim_ = isOneByOne() ? 0 : pushed_ - freedSeen_ < kFarAhead ? kFewClaimed : kManyClaimed;
-    if (pushed_ + count - freedSeen_ <= usable_) return true;
-    return second_.slots != nullptr && tryMove() && count <= usable_;
+    const auto freed =
+        std::clamp(consumer_.freed.load(std::memory_order_acquire), freeEnd_ - usable_, pushed_);
+    freeEnd_ = freed + usable_;
+    claim_ = isOneByOne() ? 0 : pushed_ - freed < kFarAhead ? kFewClaimed : kManyClaimed;
+    if (pushed_ + count <= freeEnd_) return true;
+    return canMove() && tryMove() && count <= usable_;
   }
   // Continues in the second ring, which is empty, if it has memory.
   bool tryMove() noexcept {
@@ -148,8 +150,9 @@ class RingProducer {
     auto& last = slot(pushed_);  // the one slot that is not usable
     second_.moved->store(pushed_ + 1, std::memory_order_relaxed);
     slots_ = std::exchange(second_.slots, nullptr);
-    capacity_ = usable_ = second_.capacity;
-    freedSeen_ = pushed_;
+    usable_ = second_.capacity;
+    mask_ = usable_ - 1;
+    freeEnd_ = pushed_ + usable_;
     claim_ = 0;
     // PAIR(slot-filled): a consumer that sees this sequence continues in the second ring.
     last.sequence.store(layout::kContinuesInSecondRing | (pushed_ + 1), std::memory_order_release);
@@ -162,8 +165,7 @@ class RingProducer {
   // effect here: a processor did not take a line with it that it shared with another one.) If
   // claim_ is 0, the next claim comes after the slots that are known to be free.
   [[gnu::noinline]] void claimLines() noexcept {
-    const auto end = freedSeen_ + capacity_;
-    claimed_ = claim_ == 0 ? end : std::min(end, pushed_ + claim_);
+    claimed_ = claim_ == 0 ? freeEnd_ : std::min(freeEnd_, pushed_ + claim_);
     if (claim_ == 0) return;
     for (auto position = pushed_; position < claimed_; ++position) {
       volatile auto& field = slot(position).type;
@@ -172,8 +174,8 @@ class RingProducer {
   }
 
   // In words of 64 bits, because the number of stores limits the rate of messages.
-  static void write(layout::Slot& first, const Envelope& envelope, std::uint32_t slots,
-                    std::uint32_t bodyBytes) noexcept {
+  [[gnu::always_inline]] static void write(layout::Slot& first, const Envelope& envelope,
+                                           std::uint32_t slots, std::uint32_t bodyBytes) noexcept {
     using detail::joined;
     auto* const slot = reinterpret_cast<std::byte*>(&first);
     const auto put = [&](auto at, std::uint64_t word) { std::memcpy(slot + at, &word, 8); };
@@ -211,13 +213,14 @@ class RingProducer {
   }
 
   layout::Slot* slots_;
-  std::uint64_t capacity_;
-  std::uint64_t usable_;  // slots that may hold messages
+  std::uint64_t mask_;  // number of slots - 1
   const layout::RingControl& consumer_;
   SecondRing second_;  // until we have moved there
   const RingConsumer* incoming_;
+  std::uint64_t usable_ = canMove() ? mask_ : mask_ + 1;  // slots that may hold messages
+  // End of the slots that the consumer had freed when we looked last.
+  std::uint64_t freeEnd_ = usable_;
   std::uint64_t pushed_ = 0;  // slots
-  std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
   // Lines that are claimed at once; 0: none, as in the first lap, whose lines nobody has read.
   std::uint64_t claim_ = 0;
   std::uint64_t claimed_ = 0;  // the position of the next claim
@@ -231,7 +234,7 @@ class RingConsumer {
  public:
   RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own,
                const SecondRing& second = {}) noexcept
-      : slots_(slots), capacity_(capacity), own_(own), second_(second), first_(slots) {}
+      : slots_(slots), mask_(capacity - 1), own_(own), second_(second), first_(slots) {}
 
   [[nodiscard]] bool hasMessage() noexcept {
     const auto seen = sequence();
@@ -297,9 +300,7 @@ class RingConsumer {
   }
 
  private:
-  layout::Slot& slot(std::uint64_t position) const noexcept {
-    return slots_[position & (capacity_ - 1)];
-  }
+  layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & mask_]; }
   // Of the slot of the next message.
   [[nodiscard]] std::uint64_t sequence() const noexcept {
     // PAIR(slot-filled): the message is complete.
@@ -310,16 +311,15 @@ class RingConsumer {
     if (second_.slots == nullptr || second_.hasMemory->load(std::memory_order_relaxed) == 0)
       return false;
     slots_ = std::exchange(second_.slots, nullptr);
-    capacity_ = second_.capacity;
-    batch_ = batchOf(capacity_);
+    mask_ = second_.capacity - 1;
+    batch_ = batchOf(second_.capacity);
     first_ = &slot(taken_);
     MPF_STEP(ring_followed);
     return true;
   }
 
   void end(std::uint32_t slots) noexcept {
-    taken_ += slots;
-    first_ = &slot(taken_);
+    first_ = &slot(taken_ += slots);
     if (taken_ >= batchEnd_) endBatch();
   }
   [[gnu::noinline]] void endBatch() noexcept {
@@ -347,7 +347,7 @@ class RingConsumer {
   // they are read. A consumer close behind the producer takes lines away from it that the producer
   // is about to write; then each message costs both sides a transfer of a line.
   void lookAhead() noexcept {
-    const auto near = std::min(kNear, capacity_ / 4);
+    const auto near = std::min(kNear, (mask_ + 1) / 4);
     if (!isFilledUpTo(taken_ + near) && !tryWaitForProducer(2 * near)) return;
     for (auto position = taken_; position < batchEnd_; ++position)
       __builtin_prefetch(&slot(position));
@@ -375,13 +375,13 @@ class RingConsumer {
   }
 
   layout::Slot* slots_;
-  std::uint64_t capacity_;
+  std::uint64_t mask_;  // number of slots - 1
   layout::RingControl& own_;
   SecondRing second_;  // until we have moved there
   const layout::Slot* first_;  // slot(taken_)
   std::uint64_t taken_ = 0;  // slots
   std::uint64_t freed_ = 0;  // private copy of own_.freed
-  std::uint64_t batch_ = batchOf(capacity_);  // slots that are freed at once
+  std::uint64_t batch_ = batchOf(mask_ + 1);  // slots that are freed at once
   std::uint64_t batchEnd_ = batch_;
   std::uint64_t waitAt_ = 0;  // no wait for the producer before this position
   std::uint64_t waitEvery_ = batch_;

@@ -69,13 +69,12 @@ class MessageLink final : public BodyLender {
   // Sends `message`. The caller holds lock(). After a successful send, `message` has no body of
   // this link; the caller destroys it after it has released the lock, because the return of a body
   // of another link may need that lock. If the message was not sent, `message` is unchanged.
-  // Inline, so that the envelope stays in registers.
-  [[gnu::always_inline]] LinkSend trySendLocked(const Envelope& envelope, Message& message,
+  // `envelope()` returns the envelope, as for Link::trySend().
+  template <class MakeEnvelope>
+  [[gnu::always_inline]] LinkSend trySendLocked(const MakeEnvelope& envelope, Message& message,
                                                 Link::Limits limits) noexcept {
-    if (!message.isInline() || message.body().size() > layout::kFirstSlotBodyBytes) {
-      const Envelope copy = envelope;
-      return trySendLongLocked(copy, message, limits);
-    }
+    if (!message.isInline() || message.body().size() > layout::kFirstSlotBodyBytes)
+      return trySendLongLocked(envelope(), message, limits);
     return link_->trySend(envelope, message.body(), limits);
   }
 

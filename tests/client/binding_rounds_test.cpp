@@ -66,8 +66,7 @@ class BindingRoundsTest : public BindingPartsTest {
   // Sends a request whose time has passed: the timer of the binding is due.
   static void sendExpired(Binding& binding) {
     Message request = Int32Message();
-    std::uint32_t id = 0;
-    ASSERT_EQ(binding.send(request, Deadline::atNs(1), id), SendResult::sent);
+    ASSERT_EQ(binding.send(request, Deadline::atNs(1), nullptr, Retry::never), SendResult::sent);
   }
   // Calls handleDue() with memory for this number of allocations. Returns false when it throws.
   bool tryHandleDue(int allocations) {

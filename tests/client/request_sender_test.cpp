@@ -24,7 +24,9 @@ class RequestSenderTest : public BindingPartsTest {
   }
   SendResult send(std::uint32_t id = 0) {
     Message message = Int32Message({.value = 1});
-    const auto result = sender_.send(message, Deadline::never(), id, Retry::never);
+    const auto never = Deadline::never();
+    const auto result = id == 0 ? sender_.send(message, never, nullptr, Retry::never)
+                                : sender_.sendAs(id, message, never);
     EXPECT_EQ(static_cast<bool>(message), result != SendResult::sent);
     return result;
   }

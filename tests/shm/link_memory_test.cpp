@@ -46,11 +46,11 @@ TEST(LinkGeometry, HasRoomForTheFirstRepliesToAllRequestsThatMayBeUnanswered) {
     const auto geometry = LinkGeometry::forQueue(queueSize);
     const auto further = std::max(16u, queueSize / 8);
     ASSERT_GE(geometry.queueSlots, queueSize + notFreed(geometry.queueSlots));
-    ASSERT_GE(geometry.firstOutstanding(), 1u);
+    ASSERT_GE(geometry.firstOutstanding, 1u);
     ASSERT_EQ(geometry.maxOutstanding, 2 * queueSize);
     const bool hasSecond = geometry.moreReplySlots != 0;
     ASSERT_GE(geometry.replySlots - (hasSecond ? 1 : 0),
-              geometry.firstOutstanding() + further + notFreed(geometry.replySlots))
+              geometry.firstOutstanding + further + notFreed(geometry.replySlots))
         << queueSize;
     if (!hasSecond) continue;
     ASSERT_GE(geometry.moreReplySlots,

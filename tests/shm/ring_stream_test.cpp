@@ -37,7 +37,8 @@ TEST_F(RingTest, AClaimOfLinesChangesNothing) {
   for (std::uint32_t i = 0; i < kCapacity / 2; ++i) take();
   const Bytes before(ringBytes(), ringBytes() + kBytes);
 
-  ASSERT_TRUE(producer_.tryPushShort({}, 0, {}, 0));  // in slot 0; claims some of the others
+  ASSERT_TRUE(producer_.tryPushShort([] { return Envelope{}; }, 0, {},
+                                     0));  // in slot 0; claims some of the others
 
   EXPECT_EQ(std::memcmp(ringBytes() + sizeof(layout::Slot), before.data() + sizeof(layout::Slot),
                         kBytes - sizeof(layout::Slot)),
@@ -56,7 +57,8 @@ TEST(RingStream, IsDeliveredInOrder) {
 
   std::thread sender([&] {
     for (std::uint32_t i = 0; i < kMessages; ++i) {
-      while (!producer.tryPushShort({.requestId = i}, sizeof i, std::as_bytes(std::span(&i, 1)), 0))
+      const auto envelope = [&] { return Envelope{.requestId = i}; };
+      while (!producer.tryPushShort(envelope, sizeof i, std::as_bytes(std::span(&i, 1)), 0))
         std::this_thread::yield();
     }
   });

@@ -26,35 +26,43 @@
 
 namespace mpf::detail {
 
+// The same number with 64 bits, which the compiler must have in a register: it may neither load two
+// neighbours at once, nor save 32 bits on the stack and load 64 because a shift drops the rest.
+[[nodiscard]] inline std::uint64_t widened(std::uint32_t number) noexcept {
+  std::uint64_t wide = number;
+  asm("" : "+r"(wide));
+  return wide;
+}
 // The number of 64 bits whose memory is that of `first`, then that of `second`.
-[[nodiscard]] constexpr std::uint64_t joined(std::uint32_t first, std::uint32_t second) noexcept {
+[[nodiscard]] inline std::uint64_t joined(std::uint32_t first, std::uint32_t second) noexcept {
   const bool isLittle = std::endian::native == std::endian::little;
-  return isLittle ? first | std::uint64_t{second} << 32 : std::uint64_t{first} << 32 | second;
+  return isLittle ? widened(first) | widened(second) << 32 : widened(first) << 32 | widened(second);
 }
 // The number of 32 bits whose memory is that of the three numbers, one after the other.
-[[nodiscard]] constexpr std::uint32_t joined(std::uint16_t first, std::uint8_t second,
-                                             std::uint8_t third) noexcept {
+[[nodiscard]] inline std::uint32_t joined(std::uint16_t first, std::uint8_t second,
+                                          std::uint8_t third) noexcept {
   const bool isLittle = std::endian::native == std::endian::little;
-  return isLittle ? first | std::uint32_t{second} << 16 | std::uint32_t{third} << 24
-                  : std::uint32_t{first} << 16 | std::uint32_t{second} << 8 | third;
+  const auto last = static_cast<std::uint32_t>(widened(third));
+  return isLittle ? first | std::uint32_t{second} << 16 | last << 24
+                  : std::uint32_t{first} << 16 | std::uint32_t{second} << 8 | last;
 }
 
+// Copies 8 bytes in two words of 32 bits.
+[[gnu::always_inline]] inline void copyWord(std::byte* to, const std::byte* from) noexcept {
+  std::uint32_t first = 0;
+  std::uint32_t second = 0;
+  std::memcpy(&first, from, sizeof first);
+  std::memcpy(&second, from + sizeof first, sizeof second);
+  const auto both = joined(first, second);
+  std::memcpy(to, &both, sizeof both);
+}
 // Copies `bytes` bytes, a multiple of 8. Any alignment; `to` and `from` must not overlap.
 template <std::size_t bytes>
-inline void copyWords(std::byte* to, const std::byte* from) noexcept {
-  static_assert(bytes % sizeof(std::uint64_t) == 0);
-  for (std::size_t at = 0; at < bytes; at += sizeof(std::uint64_t)) {
-    std::uint32_t first = 0;
-    std::uint32_t second = 0;
-    std::memcpy(&first, from + at, sizeof first);
-    std::memcpy(&second, from + at + sizeof first, sizeof second);
-    // Keeps the compiler from merging the two into a wider load.
-    asm("" : "+r"(first), "+r"(second));
-    const auto both = joined(first, second);
-    std::memcpy(to + at, &both, sizeof both);
-  }
+[[gnu::always_inline]] inline void copyWords(std::byte* to, const std::byte* from) noexcept {
+  static_assert(bytes % 8 == 0);
+  copyWord(to, from);
+  if constexpr (bytes > 8) copyWords<bytes - 8>(to + 8, from + 8);
 }
-
 // The same for one field, which must fit into a register: an integer, enum, bool or pointer.
 template <class Field>
 inline void copyField(Field& to, const Field& from) noexcept {
