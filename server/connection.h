@@ -51,9 +51,12 @@ struct Connection final : LinkUser {
   // place. Called by the server's thread, without the lock.
   [[nodiscard]] bool tryOwe(std::uint32_t requestId) noexcept {
     if (requestId == 0) return false;
-    if (owed(requestId).load(std::memory_order_relaxed) != 0 && !tryMakePlace(requestId))
-      return false;
-    owed(requestId).store(requestId, std::memory_order_relaxed);
+    auto* place = &owed(requestId);
+    if (place->load(std::memory_order_relaxed) != 0) {
+      if (!tryMakePlace(requestId)) return false;
+      place = &owed(requestId);
+    }
+    place->store(requestId, std::memory_order_relaxed);
     return true;
   }
   [[nodiscard]] bool owes(std::uint32_t requestId) noexcept {

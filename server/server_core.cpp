@@ -106,7 +106,7 @@ inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestI
     progress_.note(Clock::nowNs());
   }
   progress_.begin(message);
-  takeBefore_ = times.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(times.deadlineNs);
+  takeBeforeNs_ = times.deadlineNs;
 }
 
 // Whether there is a request. If not, closes the connection if its client has closed the link.

@@ -52,7 +52,9 @@ class ServerCore {
   }
   // Removes the request that was received last from the window: it has been handled, or was kept.
   void endHandling() noexcept { progress_.end(); }
-  [[nodiscard]] Deadline takeBefore() const noexcept { return takeBefore_; }
+  [[nodiscard]] Deadline takeBefore() const noexcept {
+    return takeBeforeNs_ == 0 ? Deadline::never() : Deadline::atNs(takeBeforeNs_);
+  }
   int descriptor();
   // As Endpoint::setPolled().
   void setPolled(bool isPolled) noexcept { endpoint_.setPolled(isPolled); }
@@ -95,7 +97,7 @@ class ServerCore {
   Publisher publisher_;
   RequestKeeper& keeper_;
   Progress progress_;
-  Deadline takeBefore_ = Deadline::never();  // of the request received last
+  std::int64_t takeBeforeNs_ = 0;  // of the request received last; 0: never
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;
 };
