@@ -316,7 +316,6 @@ void Link::endFanOut() noexcept {
 }
 
 void Link::afterFencedPush() noexcept {
-  untimedUntil_ = 0;  // from now on, the sampler may decide
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
   if (!peer_ || outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched) return;
@@ -325,16 +324,12 @@ void Link::afterFencedPush() noexcept {
   NoticeBatch::notify(peer_, peerIndex_, room / 2);
 }
 
-// The next message is timed if its number is a multiple of kMaxInterval, or, if the peer does not
-// poll, when the sampler says so.
-std::int64_t Link::timeIfDue() noexcept {
+// One in kMaxInterval messages to a peer that polls is timed; to others, when the sampler says so.
+std::int64_t Link::timeIfDue(bool isPolled) noexcept {
   constexpr auto kInterval = TimeSampler::kMaxInterval;
   const auto sent = out_.messages();
-  const auto watch = outWatch_.load(std::memory_order_relaxed);
-  const bool isDue =
-      watch == layout::Watch::unwatched ? sampler_.isDue(sent) : sent % kInterval == 0;
-  if (!isDue) {
-    if (watch == layout::Watch::polledUnfenced) untimedUntil_ = (sent / kInterval + 1) * kInterval;
+  if (!(isPolled ? sent % kInterval == 0 : sampler_.isDue(sent))) {
+    untimedUntil_ = (sent / kInterval + 1) * kInterval;
     return 0;
   }
   const auto nowNs = Clock::nowNs();

@@ -230,6 +230,10 @@ TEST_F(LinkTest, TimesSlowMessagesToASleepingPeerAndOneIn64ToAPollingOne) {
   link.server.watch();
   timedOf(54);
   EXPECT_EQ(timedOf(256), 4);
+
+  timedOf(5);
+  Link::execute(link.server.unwatch());
+  EXPECT_EQ(timedOf(1), 1) << "the first message after the peer has stopped polling";
 }
 
 TEST_F(LinkTest, TimesAMessageThatIsSentAtTheSecondAttempt) {
