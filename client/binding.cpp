@@ -38,9 +38,9 @@ void Binding::tryConnect() try {
   // Another thread in bind(), or a callback that ran the dispatcher, may have connected already.
   if (!isWaiting()) return;
   const auto server = connector_.tryFindServer();
-  if (!server || !connector_.tryOpenLink(server, sender_, *this)) return;
+  if (!server || !connector_.tryOpenLink(server, sender_)) return;
   setState(BindingState::connecting);
-  connector_.askForAcceptance(channel().link());
+  connector_.askForAcceptance(channel().link(), *this);
   nudgeInterval_.start(Clock::nowNs());
   timer_.wakeAt(nudgeInterval_.dueNs());
 } catch (const std::exception& error) {

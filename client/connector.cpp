@@ -79,8 +79,7 @@ std::shared_ptr<PeerWindow> Connector::tryFindServer() {
   return server;
 }
 
-bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSender& sender,
-                            LinkUser& user) {
+bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSender& sender) {
   auto& endpoint = parts_.endpoint;
   const auto index = endpoint.tryReserve();
   if (!index) {
@@ -92,7 +91,6 @@ bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSe
   try {
     endpoint.window().admit(Link::rightsAt(*server));  // the server writes hints into this window
     auto link = Link::create(endpoint.backplane().name(), endpoint.window(), *index, server);
-    link->setUser(user);
     auto channel = MessageLink::make(std::move(link), sender.lock());
     sender.open(std::move(channel));
   } catch (...) {
@@ -105,9 +103,9 @@ bool Connector::tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSe
   return true;
 }
 
-void Connector::askForAcceptance(Link& link) {
+void Connector::askForAcceptance(Link& link, LinkUser& user) {
   cancelPendingBind();
-  parts_.endpoint.attach(index_, link);
+  parts_.endpoint.attach(index_, link, user);
   link.peer()->knock(link.header().incarnation);
   setReason(notAcceptedBecause(*link.peer()));
 }

@@ -42,12 +42,11 @@ class Connector {
   // The server's window. Returns nullptr when there is no such server, and then watches for its
   // name and publishes a pending bind.
   std::shared_ptr<PeerWindow> tryFindServer();
-  // Opens a new link of `user` to `server`. Returns false when the process has no index left; then
-  // a retry is due later.
-  [[nodiscard]] bool tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSender& sender,
-                                 LinkUser& user);
-  // Asks the server to accept the new link.
-  void askForAcceptance(Link& link);
+  // Opens a new link to `server`. Returns false when the process has no index left; then a retry is
+  // due later.
+  [[nodiscard]] bool tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSender& sender);
+  // Asks the server to accept the new link, whose messages `user` handles.
+  void askForAcceptance(Link& link, LinkUser& user);
   // As askForAcceptance(), again: the server may have missed it.
   void askAgain(Link& link);
   // Ends the link and removes its segments.

@@ -80,6 +80,7 @@ bool Dispatcher::Impl::takeStop() noexcept {
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
   const auto guard = becomeRunner();
   if (takeStop()) return false;
+  // First without the preparation to wait: often there is a message already.
   return step() || run(deadline, [this] { return takeStop(); });
 }
 
@@ -138,7 +139,8 @@ void Dispatcher::Impl::dropKnocks() noexcept {
   return takeFrom(endpoint().nextPolled()) || tryOthers() || hasActed;
 }
 
-// nextPolled() returns nothing after some turns, so a busy dispatcher gets here, too.
+// Handles everything but messages of polled links. nextPolled() returns nothing after some turns,
+// so a busy dispatcher gets here, too.
 bool Dispatcher::Impl::tryOthers() {
   const bool hasResumed = bindings_.resume();
   const bool hasActed = takeFrom(endpoint().nextOther()) || hasResumed;

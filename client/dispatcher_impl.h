@@ -31,7 +31,7 @@ class Dispatcher::Impl {
   //   throws  std::logic_error when another thread runs the dispatcher
   [[nodiscard, gnu::always_inline]] RunnerGuard becomeRunner() {
     endpoint().forkGuard().check("Dispatcher");
-    if (parts_.lock.tryEnter()) return RunnerGuard(&parts_.lock, true);
+    if (parts_.lock.tryEnter()) return RunnerGuard::entered(parts_.lock);
     if (parts_.lock.isMine()) return RunnerGuard(nullptr);
     if (hasThread_) RunnerLock::throwOtherRunner();
     return acquireLock();

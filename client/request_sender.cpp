@@ -127,7 +127,7 @@ SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint3
 SendResult RequestSender::sendAs(std::uint32_t requestId, Message& message,
                                  Deadline takeBefore) noexcept {
   if (!message) return SendResult::empty;
-  return sendRarely(message, nsOf(takeBefore), requestId, nullptr, Turn::last);
+  return sendOutOfLine(message, nsOf(takeBefore), requestId, nullptr, Turn::last);
 }
 
 SendResult RequestSender::sendWithCopy(Message& message, std::int64_t deadlineNs,
@@ -135,16 +135,15 @@ SendResult RequestSender::sendWithCopy(Message& message, std::int64_t deadlineNs
   auto copy = tryCopy(message);
   if (!copy) return SendResult::noMemory;
   std::uint32_t id = 0;
-  const auto result = sendRarely(message, deadlineNs, id, &copy, Turn::last);
+  const auto result = sendOutOfLine(message, deadlineNs, id, &copy, Turn::last);
   if (requestId != nullptr && result == SendResult::sent) *requestId = id;
   return result;
 }
 
-// Not inline, so that the path of most requests is short.
-[[gnu::noinline]] SendResult RequestSender::sendRarely(Message& message, std::int64_t deadlineNs,
-                                                       std::uint32_t& requestId,
-                                                       std::unique_ptr<Message>* copy,
-                                                       Turn turn) noexcept {
+[[gnu::noinline]] SendResult RequestSender::sendOutOfLine(Message& message, std::int64_t deadlineNs,
+                                                          std::uint32_t& requestId,
+                                                          std::unique_ptr<Message>* copy,
+                                                          Turn turn) noexcept {
   return sendInTurn(message, deadlineNs, requestId, copy, turn);
 }
 
@@ -213,7 +212,7 @@ SendResult RequestSender::trySendUntaken() {
   auto message = untaken_.front().message->duplicate();
   auto& next = untaken_.front();
   auto id = next.id;
-  return sendRarely(message, next.deadlineNs, id, &next.message, Turn::firstUntaken);
+  return sendOutOfLine(message, next.deadlineNs, id, &next.message, Turn::firstUntaken);
 }
 
 // Counts each refusal, and reports a series of them once, in its place among the other messages.

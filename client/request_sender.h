@@ -34,7 +34,7 @@ class RequestSender {
         timer_(timer),
         postFullReport_(std::move(postFullReport)) {}
 
-  // As MessageClient::send(), but leaves a message that was not sent where it is.
+  // As MessageClient::send().
   SendResult send(Message& message, Deadline takeBefore, std::uint32_t* requestId,
                   Retry retry) noexcept;
   // As RelayClient::sendAs().
@@ -78,8 +78,10 @@ class RequestSender {
   //   copy        nullptr, or a copy to keep until the request is taken; moved from if it was sent
   SendResult sendInTurn(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
                         std::unique_ptr<Message>* copy, Turn turn) noexcept;
-  SendResult sendRarely(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
-                        std::unique_ptr<Message>* copy, Turn turn) noexcept;
+  // The same for the less frequent kinds of requests: the code exists twice, so that it is short in
+  // send().
+  SendResult sendOutOfLine(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
+                           std::unique_ptr<Message>* copy, Turn turn) noexcept;
   SendResult trySendLocked(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
                            std::unique_ptr<Message>* copy) noexcept;
   SendResult sendWithCopy(Message& message, std::int64_t deadlineNs,

@@ -111,12 +111,13 @@ class RunnerLock {
   std::weak_ptr<void> lastRunnerAlive_;  // under mutex_; expires when that thread ends
 };
 
-// Releases `lock`, unless it is nullptr, at the end of the scope.
+// Releases a lock at the end of the scope.
 class RunnerGuard {
  public:
-  //   hasEntered   by tryEnter(), which costs less to undo
-  explicit RunnerGuard(RunnerLock* lock, bool hasEntered = false) noexcept
-      : lock_(lock), hasEntered_(hasEntered) {}
+  //   lock   nullptr: nothing is released
+  explicit RunnerGuard(RunnerLock* lock) noexcept : RunnerGuard(lock, false) {}
+  // After lock.tryEnter(), which costs less to undo than other ways to take the lock.
+  [[nodiscard]] static RunnerGuard entered(RunnerLock& lock) noexcept { return {&lock, true}; }
   [[gnu::always_inline]] ~RunnerGuard() {
     if (hasEntered_) lock_->leave();
     else if (lock_ != nullptr) lock_->release();
@@ -125,6 +126,8 @@ class RunnerGuard {
   RunnerGuard& operator=(const RunnerGuard&) = delete;
 
  private:
+  RunnerGuard(RunnerLock* lock, bool hasEntered) noexcept : lock_(lock), hasEntered_(hasEntered) {}
+
   RunnerLock* lock_;
   bool hasEntered_;
 };

@@ -50,7 +50,6 @@ Connection& Connections::add(std::uint32_t index, std::unique_ptr<Link> link) tr
   auto& connection = *all_[index];
   const auto incarnation = link->header().incarnation;
   std::vector<std::atomic<std::uint32_t>> unanswered(std::bit_ceil(link->maxOutstanding()));
-  link->setUser(connection);
   auto channel = MessageLink::make(std::move(link), connection.lock);
   byLink_[incarnation] = &connection;
   {
@@ -70,7 +69,7 @@ Connection& Connections::add(std::uint32_t index, std::unique_ptr<Link> link) tr
 
 void Connections::open(Connection& connection) {
   auto& link = connection.channel->link();
-  endpoint_.attach(connection.index, link);
+  endpoint_.attach(connection.index, link, connection);
   count(endpoint_.control().linksOpened);
   link.control().serverIndex.store(connection.index, std::memory_order_relaxed);
   link.setState(layout::LinkState::open);

@@ -2,7 +2,6 @@
 #include "server/reply_sender.h"
 
 #include <memory>
-#include <utility>
 
 #include <mpf/clock.h>
 
@@ -47,14 +46,16 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const Link::Batch batch(link);
   const auto sentBefore = link.outgoing().messages();
   RepliedMany sent;
-  const auto [client, generation] = std::pair(route.link, route.flags);
+  const auto client = route.link;
+  const auto generation = route.flags;
   for (auto& message : messages) {
     if (message.route().link != client || message.route().flags != generation) break;
     if (message) sent.result = sendLocked(connection, message);
     if (sent.result != ReplyResult::sent) break;
     ++sent.count;
   }
-  if (const auto number = link.outgoing().messages() - sentBefore; number != 0) count(link, number);
+  if (const auto number = link.outgoing().messages() - sentBefore; number != 0)
+    counts_.sent(number);
   return sent;
 }
 
@@ -62,13 +63,8 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
                                                                      Message& message) noexcept {
   if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
   const auto result = sendLocked(connection, message);
-  if (result == ReplyResult::sent) count(connection.channel->link(), 1);
+  if (result == ReplyResult::sent) counts_.sent();
   return result;
-}
-
-[[gnu::always_inline]] inline void ReplySender::count(Link& link, std::uint64_t replies) noexcept {
-  link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
-  counts_.sent(replies);
 }
 
 // Inline, because it is on the path of each message.
@@ -77,7 +73,8 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   auto& link = connection.channel->link();
   // First: values that were computed before a call would have to be saved on the stack.
   const auto sentNs = link.timeOfNext();
-  if (stamps_ && message.getTimeStampNs() == 0) message.setTimeStampNs(Clock::wallNs());
+  const auto givenNs = message.getTimeStampNs();
+  const auto timeNs = stamps_ && givenNs == 0 ? Clock::wallNs() : givenNs;
   const auto requestId = message.route().requestId;
   const bool isFirst = connection.owes(requestId);
   const auto envelope = [&] {
@@ -88,13 +85,14 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
         .clientType = message.getClientType(),
         .clientExtra = message.getClientExtra(),
         .sentTick = Tick::ofSample(sentNs),
-        .timeNs = message.getTimeStampNs(),
+        .timeNs = timeNs,
     };
   };
   const auto reserve = isFirst ? 0 : link.slotsOfFirstReplies();
   const auto result = connection.channel->trySendLocked(envelope, message, {0, reserve});
   if (result != LinkSend::sent && result != LinkSend::sentInPlace) return noteRefused(result);
   MPF_STEP(reply_sent);
+  link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
   if (!isFirst) return ReplyResult::sent;
   static_cast<void>(message.exchangeKeeper(nullptr));
   connection.owed(requestId).store(0, std::memory_order_relaxed);

@@ -40,8 +40,6 @@ class ReplySender {
   static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
-  // Counts what was sent on a link.
-  void count(Link& link, std::uint64_t replies) noexcept;
   // The caller counts what was sent.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
   void noteServiceTime(Connection& connection) noexcept;

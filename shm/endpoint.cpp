@@ -59,7 +59,8 @@ void Endpoint::countLinks(std::int32_t more) noexcept {
               std::memory_order_relaxed);
 }
 
-void Endpoint::attach(std::uint32_t index, Link& link) {
+void Endpoint::attach(std::uint32_t index, Link& link, LinkUser& user) {
+  link.setUser(user);
   links_[index] = &link;
   countLinks(+1);
   readyBits_.set(index);

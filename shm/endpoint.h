@@ -53,8 +53,8 @@ class Endpoint {
   // --- links ---
   // Reserves an index (the bit of a new link); nullopt if all are in use.
   std::optional<std::uint32_t> tryReserve() noexcept;
-  // Adds the link of a reserved index. The endpoint does not own it.
-  void attach(std::uint32_t index, Link& link);
+  // Adds the link of a reserved index. The endpoint owns neither it nor its user.
+  void attach(std::uint32_t index, Link& link, LinkUser& user);
   // Removes the link and frees its index.
   void detach(std::uint32_t index) noexcept;
   // Ignores messages of this link until release(). The index stays reserved.

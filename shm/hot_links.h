@@ -61,7 +61,7 @@ class HotLinks {
       if (++hot.misses == 1) hot.link->incoming().onEmpty();
       if (hot.misses >= kCoolAfter) return cool(static_cast<std::size_t>(turn_ - hot_.data()));
     }
-    return {};
+    return nullptr;
   }
 
  private:

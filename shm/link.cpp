@@ -85,9 +85,12 @@ LinkGeometry LinkGeometry::forQueue(std::uint32_t queueSize) noexcept {
   // Most clients have few unanswered requests: they need a quarter of this.
   constexpr std::uint32_t kLeastSlots = 64;
   const auto first = std::max(kLeastSlots, replySlots / 4);
-  if (first >= replySlots)
-    return {ringSlotsFor(queueSize), replySlots, 0, maxOutstanding, maxOutstanding};
-  return {ringSlotsFor(queueSize), first, replySlots, maxOutstanding, first / 4};
+  const bool hasSecond = first < replySlots;
+  return {.queueSlots = ringSlotsFor(queueSize),
+          .replySlots = hasSecond ? first : replySlots,
+          .moreReplySlots = hasSecond ? replySlots : 0,
+          .maxOutstanding = maxOutstanding,
+          .firstOutstanding = hasSecond ? first / 4 : maxOutstanding};
 }
 
 Rights Link::rightsAt(const PeerWindow& server) {
@@ -324,7 +327,8 @@ void Link::afterFencedPush() noexcept {
   NoticeBatch::notify(peer_, peerIndex_, room / 2);
 }
 
-// One in kMaxInterval messages to a peer that polls is timed; to others, when the sampler says so.
+// Of the messages to a peer that polls, one in kMaxInterval is timed; of others, those that the
+// sampler chooses.
 std::int64_t Link::timeIfDue(bool isPolled) noexcept {
   constexpr auto kInterval = TimeSampler::kMaxInterval;
   const auto sent = out_.messages();

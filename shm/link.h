@@ -54,7 +54,8 @@ struct LinkGeometry {
   static LinkGeometry forQueue(std::uint32_t queueSize) noexcept;
 };
 
-// Takes the messages of links. An endpoint returns links; each tells whose it is.
+// Base of the object that handles the messages of a link. All links of one endpoint have users of
+// one type, to which the owner of the endpoint casts.
 class LinkUser {
  protected:
   ~LinkUser() = default;
@@ -93,7 +94,7 @@ class Link {
   void attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept;
   void setPeerIndex(std::uint32_t peerIndex) noexcept { peerIndex_ = peerIndex; }
 
-  // The user of this side: set before the link is attached to an endpoint.
+  // The user of this side: Endpoint::attach() sets it.
   void setUser(LinkUser& user) noexcept { user_ = &user; }
   [[nodiscard]] LinkUser& user() const noexcept { return *user_; }
 
@@ -116,8 +117,9 @@ class Link {
                ? geometry_.firstOutstanding
                : geometry_.maxOutstanding;
   }
-  // At the server: slots to leave free for first replies in the ring that is in use. When the first
-  // ring is full, there is no more to answer, or there is memory for the second one.
+  // At the server: slots to leave free for first replies in the ring that is in use. In the first
+  // ring, these are the requests that may be unanswered while the second one has no memory. When it
+  // has memory, the server can move there, and the second ring begins empty.
   [[nodiscard]] std::uint32_t slotsOfFirstReplies() const noexcept {
     return out_.canMove() ? geometry_.firstOutstanding : geometry_.maxOutstanding;
   }

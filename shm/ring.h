@@ -84,7 +84,7 @@ class RingProducer {
     return true;
   }
   // As tryPush(), for a body of at most layout::kFirstSlotBodyBytes. Calls `envelope()` after the
-  // checks, so that its values need no places on the stack meanwhile.
+  // checks, so that its values need no stack meanwhile; `bodyBytes` replaces its own.
   template <class MakeEnvelope>
   [[nodiscard, gnu::always_inline]] bool tryPushShort(const MakeEnvelope& envelope,
                                                       std::uint32_t bodyBytes,
@@ -140,8 +140,7 @@ class RingProducer {
         std::clamp(consumer_.freed.load(std::memory_order_acquire), freeEnd_ - usable_, pushed_);
     freeEnd_ = freed + usable_;
     claim_ = isOneByOne() ? 0 : pushed_ - freed < kFarAhead ? kFewClaimed : kManyClaimed;
-    if (pushed_ + count <= freeEnd_) return true;
-    return canMove() && tryMove() && count <= usable_;
+    return pushed_ + count <= freeEnd_ || (canMove() && tryMove() && count <= usable_);
   }
   // Continues in the second ring, which is empty, if it has memory.
   bool tryMove() noexcept {
@@ -319,7 +318,8 @@ class RingConsumer {
   }
 
   void end(std::uint32_t slots) noexcept {
-    first_ = &slot(taken_ += slots);
+    taken_ += slots;
+    first_ = &slot(taken_);
     if (taken_ >= batchEnd_) endBatch();
   }
   [[gnu::noinline]] void endBatch() noexcept {

@@ -72,8 +72,8 @@ TEST_F(ConnectorTest, OpensALinkThatTheServerAccepts) {
   const auto window = connector_.tryFindServer();
   ASSERT_TRUE(window);
 
-  ASSERT_TRUE(connector_.tryOpenLink(window, sender_, *owner_));
-  connector_.askForAcceptance(sender_.channel()->link());
+  ASSERT_TRUE(connector_.tryOpenLink(window, sender_));
+  connector_.askForAcceptance(sender_.channel()->link(), *owner_);
 
   while (sender_.channel()->link().peerState() != layout::LinkState::open)
     static_cast<void>(server.receive());
@@ -86,7 +86,7 @@ TEST_F(ConnectorTest, UnmapsTheServersWindowAtTheEndOfTheLink) {
   const MessageServer server(backplane_, "dac");
   const auto before = mappings();
   connector_.setServer("dac", 0);
-  ASSERT_TRUE(connector_.tryOpenLink(connector_.tryFindServer(), sender_, *owner_));
+  ASSERT_TRUE(connector_.tryOpenLink(connector_.tryFindServer(), sender_));
   EXPECT_EQ(mappings(), before + 1);
 
   connector_.closeLink(sender_);
@@ -103,7 +103,7 @@ TEST_F(ConnectorTest, TriesADeadServerWhoseWindowStaysOnlyAfterAPause) {
   ASSERT_TRUE(window);
   const auto hints =
       SegmentName::keyed(backplane_.name(), NameKind::hints, window->header().incarnation);
-  ASSERT_TRUE(connector_.tryOpenLink(window, sender_, *owner_));
+  ASSERT_TRUE(connector_.tryOpenLink(window, sender_));
   connector_.closeLink(sender_);
 
   EXPECT_FALSE(connector_.tryFindServer());
@@ -119,8 +119,8 @@ TEST_F(ConnectorTest, WithdrawsThePendingBindWhenTheServerStarts) {
   const MessageServer server(backplane_, "dac");
   const auto window = connector_.tryFindServer();
 
-  ASSERT_TRUE(connector_.tryOpenLink(window, sender_, *owner_));
-  connector_.askForAcceptance(sender_.channel()->link());
+  ASSERT_TRUE(connector_.tryOpenLink(window, sender_));
+  connector_.askForAcceptance(sender_.channel()->link(), *owner_);
 
   EXPECT_FALSE(hasPendingBind());
   connector_.closeLink(sender_);

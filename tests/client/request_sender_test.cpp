@@ -18,8 +18,8 @@ class RequestSenderTest : public BindingPartsTest {
   void open() {
     const auto server = connector_.tryFindServer();
     ASSERT_TRUE(server);
-    ASSERT_TRUE(connector_.tryOpenLink(server, sender_, *owner_));
-    connector_.askForAcceptance(sender_.channel()->link());
+    ASSERT_TRUE(connector_.tryOpenLink(server, sender_));
+    connector_.askForAcceptance(sender_.channel()->link(), *owner_);
     state_ = BindingState::connected;
   }
   SendResult send(std::uint32_t id = 0) {

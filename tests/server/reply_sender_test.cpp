@@ -103,6 +103,20 @@ TEST_F(ReplySenderTest, AFullQueueRefusesFurtherRepliesButNotTheFirst) {
   EXPECT_EQ(replies_.send(first), ReplyResult::sent);
 }
 
+TEST_F(ReplySenderTest, TheTimeOfSendingIsThatOfTheAttemptThatSucceeds) {
+  ReplySender stamping{counts_, true};
+  auto further = replyTo(connection_.routeOf(4, nullptr));
+  while (replies_.send(further) == ReplyResult::sent) further = replyTo(further.route());
+
+  EXPECT_EQ(stamping.send(further), ReplyResult::queueFull);
+  EXPECT_EQ(further.getTimeStampNs(), 0);
+  while (link_.incoming().hasMessage()) static_cast<void>(take(link_));
+  link_.incoming().onEmpty();
+
+  ASSERT_EQ(stamping.send(further), ReplyResult::sent);
+  EXPECT_NE(take(link_).timeNs, 0);
+}
+
 TEST_F(ReplySenderTest, AnAbandonedRequestIsRefusedOnce) {
   const auto route = owe(connection_, 3);
 

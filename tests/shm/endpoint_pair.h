@@ -20,7 +20,7 @@ struct Offer {
   std::uint64_t maxPoolBytes = 16 << 20;
 };
 
-struct End {
+struct End final : LinkUser {
   // If `server` is empty, this is a client.
   End(const Backplane& backplane, const std::string& server, WaitMode mode = WaitMode::adaptive,
       Offer offer = {})
@@ -51,7 +51,7 @@ struct End {
   Link& keep(std::uint32_t index, std::unique_ptr<Link> link) {
     if (links.size() <= index) links.resize(index + 1);
     links[index] = std::move(link);
-    endpoint.attach(index, *links[index]);
+    endpoint.attach(index, *links[index], *this);
     return *links[index];
   }
   // A value for Envelope, for tests that check only one word.

@@ -25,8 +25,8 @@ class EndpointTest : public ShmTest {
       for (const auto& link : links) static_cast<void>(send(link.client, 1));
       auto* const ready = end.endpoint.next();
       if (ready == nullptr || !End::tryTake(*ready)) continue;
-      ++taken[static_cast<std::size_t>(
-          std::ranges::find(end.links, ready, &std::unique_ptr<Link>::get) - end.links.begin())];
+      const auto isIt = [&](const auto& link) { return link.get() == ready; };
+      ++taken[static_cast<std::size_t>(std::ranges::find_if(end.links, isIt) - end.links.begin())];
     }
     return taken;
   }

@@ -91,26 +91,30 @@ TEST_F(LinkMemoryTest, AllowsNoMoreWithoutMemory) {
 
 // The server sends further replies until it may send no more, and then all first replies.
 TEST_F(LinkMemoryTest, FirstRepliesAlwaysHaveRoom) {
+  enum class Allows { never, beforeFurtherReplies, afterThem };
   for (const std::uint32_t queueSize : {1u, 5u, 20u, 21u, 47u, 48u, 100u, 103u, 1000u}) {
-    for (const bool allowsMore : {false, true}) {
-      for (const std::uint32_t takenBefore : {0u, 5u, 63u}) {
-        const auto link = makeLink(queueSize);
-        std::uint32_t sent = 0;
-        for (; sent < takenBefore; ++sent) {
-          ASSERT_EQ(send(link.server, 8), LinkSend::sent);
-          take(link.client);
+    for (const auto allows : {Allows::never, Allows::beforeFurtherReplies, Allows::afterThem}) {
+      for (const auto sizes : {1u, 100u}) {  // bodies of 0, and of 0 to 99 bytes
+        for (const std::uint32_t takenBefore : {0u, 5u, 63u}) {
+          const auto link = makeLink(queueSize);
+          std::uint32_t sent = 0;
+          for (; sent < takenBefore; ++sent) {
+            ASSERT_EQ(send(link.server, 8), LinkSend::sent);
+            take(link.client);
+          }
+          ASSERT_TRUE(allows != Allows::beforeFurtherReplies || link.client.tryAllowMore());
+          const auto further = [&] {
+            return send(link.server, sent % sizes, link.server.slotsOfFirstReplies());
+          };
+          while (further() == LinkSend::sent) ++sent;
+          ASSERT_TRUE(allows != Allows::afterThem || link.client.tryAllowMore());
+
+          for (std::uint32_t i = 0; i < link.client.maxOutstanding(); ++i, ++sent)
+            ASSERT_EQ(send(link.server, 8), LinkSend::sent) << queueSize << " " << i;
+
+          for (; sent > takenBefore; --sent) take(link.client);
+          EXPECT_FALSE(link.client.incoming().hasMessage());
         }
-        const auto further = [&] {
-          return send(link.server, sent % 100, link.server.maxOutstanding());
-        };
-        while (further() == LinkSend::sent) ++sent;
-        ASSERT_TRUE(!allowsMore || link.client.tryAllowMore());
-
-        for (std::uint32_t i = 0; i < link.client.maxOutstanding(); ++i, ++sent)
-          ASSERT_EQ(send(link.server, 8), LinkSend::sent) << queueSize << " " << i;
-
-        for (; sent > takenBefore; --sent) take(link.client);
-        EXPECT_FALSE(link.client.incoming().hasMessage());
       }
     }
   }

@@ -42,12 +42,13 @@ namespace mpf::detail {
 [[nodiscard]] inline std::uint32_t joined(std::uint16_t first, std::uint8_t second,
                                           std::uint8_t third) noexcept {
   const bool isLittle = std::endian::native == std::endian::little;
+  // The first two come from a message or are constants; a flag may have been saved on the stack.
   const auto last = static_cast<std::uint32_t>(widened(third));
   return isLittle ? first | std::uint32_t{second} << 16 | last << 24
                   : std::uint32_t{first} << 16 | std::uint32_t{second} << 8 | last;
 }
 
-// Copies 8 bytes in two words of 32 bits.
+// Copies 8 bytes: reads two words of 32 bits and writes one of 64.
 [[gnu::always_inline]] inline void copyWord(std::byte* to, const std::byte* from) noexcept {
   std::uint32_t first = 0;
   std::uint32_t second = 0;
@@ -59,7 +60,7 @@ namespace mpf::detail {
 // Copies `bytes` bytes, a multiple of 8. Any alignment; `to` and `from` must not overlap.
 template <std::size_t bytes>
 [[gnu::always_inline]] inline void copyWords(std::byte* to, const std::byte* from) noexcept {
-  static_assert(bytes % 8 == 0);
+  static_assert(bytes != 0 && bytes % 8 == 0);
   copyWord(to, from);
   if constexpr (bytes > 8) copyWords<bytes - 8>(to + 8, from + 8);
 }
