@@ -25,7 +25,7 @@ constexpr int kStepsOfALink = 500;
 constexpr int kLinks = 12;
 constexpr const char* kServer = "echo";
 
-class Peer {
+class Peer final : LinkUser {
  public:
   Peer(const Backplane& backplane, LinkSide side, std::string kind, Random& random)
       : side_(side),
@@ -64,7 +64,7 @@ class Peer {
       server = endpoint_.peers().tryOpen(SegmentName::serverWindow(backplane(), 0, kServer),
                                          layout::SegmentKind::serverWindow);
     auto link = Link::create(backplane(), endpoint_.window(), index, server);
-    endpoint_.attach(index, *link);
+    endpoint_.attach(index, *link, *this);
     // The server may still be busy with earlier attacks.
     while (link->peerState() != layout::LinkState::open) {
       server->knock(link->header().incarnation);
@@ -94,7 +94,7 @@ class Peer {
         layout::SegmentKind::clientWindow);
     if (!client) return nullptr;
     link->attachPeer(std::move(client), link->header().clientIndex);
-    endpoint_.attach(index, *link);
+    endpoint_.attach(index, *link, *this);
     link->control().serverIndex.store(index, std::memory_order_relaxed);
     link->setState(layout::LinkState::open);
     link->notifyPeer();
