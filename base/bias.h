@@ -73,7 +73,6 @@ class Bias {
 
  private:
   static constexpr std::uint32_t kEntries = 256;
-  static constexpr std::uint64_t kNoThread = 1;  // numbers of threads are even
 
   [[nodiscard]] bool isEnabled() const noexcept {
     return enabledFor_.load(std::memory_order_relaxed) != kNoThread;

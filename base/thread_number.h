@@ -23,6 +23,8 @@ inline std::uint64_t threadNumber() noexcept {
   if (number == 0) number = last.fetch_add(2, std::memory_order_relaxed) + 2;
   return number;
 }
+// The number of no thread.
+inline constexpr std::uint64_t kNoThread = 1;
 // As threadNumber(), but 0 if this thread has not asked for its number yet.
 inline std::uint64_t threadNumberOrZero() noexcept { return detail::ownThreadNumber; }
 

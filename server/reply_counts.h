@@ -35,8 +35,6 @@ class ReplyCounts {
   void service(std::int64_t ns) noexcept { recordFromAnyThread(control_.serviceNs, ns); }
 
  private:
-  static constexpr std::uint64_t kNoThread = 1;  // numbers of threads are even
-
   layout::WindowControl& control_;
   std::atomic<std::uint64_t> serverThread_{kNoThread};  // its threadNumber()
 };

@@ -37,8 +37,8 @@ TEST_F(RingTest, AClaimOfLinesChangesNothing) {
   for (std::uint32_t i = 0; i < kCapacity / 2; ++i) take();
   const Bytes before(ringBytes(), ringBytes() + kBytes);
 
-  ASSERT_TRUE(producer_.tryPushShort([] { return Envelope{}; }, 0, {},
-                                     0));  // in slot 0; claims some of the others
+  // In slot 0; claims some of the others.
+  ASSERT_TRUE(producer_.tryPushShort([] { return Envelope{}; }, 0, {}, 0));
 
   EXPECT_EQ(std::memcmp(ringBytes() + sizeof(layout::Slot), before.data() + sizeof(layout::Slot),
                         kBytes - sizeof(layout::Slot)),
