@@ -55,6 +55,7 @@ class HotLinks {
       auto& hot = *turn_;
       if (hot.link->incoming().hasMessage()) {
         hot.misses = 0;
+        hot.link->outgoing().expectPush();
         if (++hot.turns == kUnfencedAfter) hot.link->letPeerSendUnfenced();
         return hot.link;
       }
