@@ -82,8 +82,8 @@ SendResult RequestSender::tryAllowMore() noexcept {
     return Envelope{
         .type = static_cast<std::uint16_t>(message.getType()),
         .requestId = id,
-        .clientType = message.getClientType(),
-        .clientExtra = message.getClientExtra(),
+        .clientType = detail::alone(message.getClientType()),
+        .clientExtra = detail::alone(message.getClientExtra()),
         .sentTick = Tick::ofSample(sentNs),
         .timeNs = deadlineNs,
     };

@@ -82,8 +82,8 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
         .type = static_cast<std::uint16_t>(message.getType()),
         .flags = isFirst ? layout::kSlotFirstReply : std::uint8_t{0},
         .requestId = requestId,
-        .clientType = message.getClientType(),
-        .clientExtra = message.getClientExtra(),
+        .clientType = detail::alone(message.getClientType()),
+        .clientExtra = detail::alone(message.getClientExtra()),
         .sentTick = Tick::ofSample(sentNs),
         .timeNs = timeNs,
     };

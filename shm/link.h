@@ -156,7 +156,7 @@ class Link {
   }
   LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
                    Limits limits) noexcept {
-    return trySend([&] { return envelope; }, body, limits);
+    return trySend([&]() -> const Envelope& { return envelope; }, body, limits);
   }
   // While it exists, messages are sent without a notice to the peer; at its end, one notice stands
   // for all of them.

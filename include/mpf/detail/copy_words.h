@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// copyWords, copyField, joined: copies of what has just been written, through registers.
+// copyWords, copyField, alone, joined: copies of what has just been written, through registers.
 //
 // Internal: installed because <mpf/message.h> uses them, as the rings in shared memory do. Programs
 // must not: any release may change or remove them.
@@ -26,12 +26,17 @@
 
 namespace mpf::detail {
 
-// The same number with 64 bits, which the compiler must have in a register: it may neither load two
-// neighbours at once, nor save 32 bits on the stack and load 64 because a shift drops the rest.
+// The same value, which the compiler must have in a register of its own: it may not load two
+// neighbours at once. An integer, enum, bool or pointer.
+template <class Value>
+[[nodiscard]] inline Value alone(Value value) noexcept {
+  asm("" : "+r"(value));
+  return value;
+}
+// The same number with 64 bits: the compiler may not save 32 bits on the stack and load 64, because
+// a shift drops the rest.
 [[nodiscard]] inline std::uint64_t widened(std::uint32_t number) noexcept {
-  std::uint64_t wide = number;
-  asm("" : "+r"(wide));
-  return wide;
+  return alone(std::uint64_t{number});
 }
 // The number of 64 bits whose memory is that of `first`, then that of `second`.
 [[nodiscard]] inline std::uint64_t joined(std::uint32_t first, std::uint32_t second) noexcept {
@@ -64,12 +69,10 @@ template <std::size_t bytes>
   copyWord(to, from);
   if constexpr (bytes > 8) copyWords<bytes - 8>(to + 8, from + 8);
 }
-// The same for one field, which must fit into a register: an integer, enum, bool or pointer.
+// The same for one field, as for alone().
 template <class Field>
 inline void copyField(Field& to, const Field& from) noexcept {
-  Field field = from;
-  asm("" : "+r"(field));
-  to = field;
+  to = alone(from);
 }
 
 }  // namespace mpf::detail
