@@ -117,6 +117,7 @@ Link* Endpoint::nextReady() noexcept {
   const auto index = readyBits_.tryTake([this](std::uint32_t of) { return isAttached(of); });
   if (!index) return nullptr;
   if (!hot_.tryAdd(*index, *links_[*index])) revisit_ = index;
+  links_[*index]->expectSend();
   return links_[*index];
 }
 
@@ -205,6 +206,7 @@ void Endpoint::sleep(Deadline deadline) noexcept {
     MPF_STEP(falling_asleep);
     doorbell::sleep(bell, seen, until);
     MPF_STEP(woken);
+    readyBits_.expectTake();
     slept_ = true;
     control().wakes.store(control().wakes.load(std::memory_order_relaxed) + 1,
                           std::memory_order_relaxed);

@@ -207,6 +207,14 @@ class Link {
   // Frees one of our chunks or returns a borrowed one; `data` points to the start of the chunk.
   void release(const std::byte* data) noexcept;
 
+  // Fetches the lines that the next message needs, while the caller prepares it. The receiving
+  // thread.
+  void expectSend() const noexcept {
+    out_.expectPush();
+    if (peer_ && outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched)
+      peer_->expectNotify(peerIndex_);
+  }
+
   // --- receiving ---
   // The ring from which messages are taken.
   [[nodiscard]] RingConsumer& incoming() noexcept { return in_; }

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "shm/cache_line.h"
 #include "shm/layout.h"
 
 namespace mpf {
@@ -44,6 +45,12 @@ class ReadyBits {
       if (index && isLink(*index)) return index;
     }
     return std::nullopt;
+  }
+  // Fetches the lines that the next tryTake() probably needs.
+  void expectTake() const noexcept {
+    const auto word = position_ / 64;
+    lines::request(&hints_.readyWords[word / 64]);
+    lines::request(&hints_.readyBits[word]);
   }
   // The index after the one that was taken last.
   [[nodiscard]] std::uint32_t position() const noexcept { return position_; }

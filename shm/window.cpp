@@ -14,6 +14,7 @@
 
 #include "base/expedited_barrier.h"
 #include "base/step.h"
+#include "shm/cache_line.h"
 #include "shm/process.h"
 #include "shm/segment_name.h"
 
@@ -200,6 +201,15 @@ void PeerWindow::notify(std::uint32_t index) noexcept {
   // PAIR(ready-word): an owner that sees the word's bit sees the ready bit.
   hint.readyWords[word / 64].fetch_or(std::uint64_t{1} << (word % 64), std::memory_order_release);
   wakeIfAsleep();
+}
+
+void PeerWindow::expectNotify(std::uint32_t index) const noexcept {
+  const auto& hint = hints();
+  const auto word = index % layout::kMaxLinks / 64;
+  lines::request(&hint.readyBits[word]);
+  lines::request(&hint.readyWords[word / 64]);
+  __builtin_prefetch(&control().sleeping);
+  lines::request(&hint.bell);
 }
 
 void PeerWindow::knock(std::uint64_t incarnation) noexcept {

@@ -90,6 +90,8 @@ class PeerWindow {
   // Notifies the owner that link `index` has a message or a change of state, and wakes it if it
   // sleeps. The message or the change must have been stored before.
   void notify(std::uint32_t index) noexcept;
+  // Fetches the lines that notify() needs, for a caller that will probably notify soon. Any thread.
+  void expectNotify(std::uint32_t index) const noexcept;
   // Asks the owner to accept link `incarnation`.
   void knock(std::uint64_t incarnation) noexcept;
   // Makes the next notification ring even if we have rung for this sleep already. For a caller that
