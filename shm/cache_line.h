@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// lines: brings cache lines to this processor before it writes to them. It changes no data.
+// lines: fetches cache lines for this processor before it writes to them. The data stay the same.
 //
 // A line that another processor has read must come back before a write to it takes effect. An Intel
-// processor fetches it with prefetchw, without waiting. An AMD processor (Zen 3) takes no line with
-// prefetchw that others read; there only a write brings it back.
+// processor fetches it with prefetchw, without waiting (those before Broadwell ignore prefetchw).
+// On an AMD processor (Zen 3), prefetchw does not fetch such a line; only a write does.
+//
+// Threads  request(): any; claim(): the thread that may write the field.
 #pragma once
 
 namespace mpf::lines {
@@ -26,8 +28,8 @@ inline void request(const void* address) noexcept {
 #endif
 }
 
-// Fetches the line of a field for writing. Only for the thread that may write the field: where
-// request() has no effect, this writes what is there already.
+// Fetches the line of a field for writing. Where request() has no effect, this writes what is there
+// already.
 template <class T>
 void claim(T& field) noexcept {
   if (requestsReadLines()) return request(&field);

@@ -46,7 +46,8 @@ class HotLinks {
     }
     return false;
   }
-  // The next polled link that has a message; links take turns. nullptr if it finds none.
+  // The next polled link that has a message; links take turns. Requests the line of the next slot
+  // of the other direction. nullptr if it finds none.
   // Frees the slots of a link when it finds no message there for the first time. Ends the polling
   // of a link that is idle for long, and then returns although others may have messages.
   [[gnu::always_inline]] Link* next() noexcept {

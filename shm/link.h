@@ -5,8 +5,8 @@
 //   client side ── requests ring, client's pool ──► server side
 //               ◄── replies ring, server's pool ──
 //
-// Threads  one thread receives, with incoming(). The caller serialises all other non-const
-//          functions, those of outgoing() included.
+// Threads  one thread receives, with incoming(), and may call expectSend(). The caller serialises
+//          all other non-const functions, those of outgoing() included.
 // Crash    the client owns the segment. If the owner of the client's window dies, the server
 //          removes the segment.
 // Trust    the peer may write every byte. The geometry is copied and checked when the link is
@@ -154,6 +154,7 @@ class Link {
     afterPush();
     return LinkSend::sent;
   }
+  // The envelope stays where it is: a copy would wait for the stores to it.
   LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
                    Limits limits) noexcept {
     return trySend([&]() -> const Envelope& { return envelope; }, body, limits);

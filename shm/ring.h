@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Ring: hands messages of 1 to 4 slots from one producer process to one consumer process
-// (shm/ring_consumer.h).
+// Ring: hands messages of 1 to 4 slots from one producer process to one consumer process.
+// The producer is here, the consumer in shm/ring_consumer.h.
 //
 //   | slot 0 | slot 1 | ... | slot capacity-1 |
 //
@@ -12,7 +12,7 @@
 //
 //   | first ring, full | ─ slot that says "continues" ─► | second ring |
 //
-// Threads  one thread pushes, one thread takes.
+// Threads  one thread pushes, one thread takes; expectPush(): any.
 // Crash    a producer that is killed before its release store has pushed nothing.
 // Trust    each end keeps its own positions. Values that the other side writes are range-checked;
 //          wrong ones cost messages, never memory safety.
@@ -22,6 +22,7 @@
 #include <atomic>
 #include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <span>
 #include <utility>
@@ -92,7 +93,9 @@ class RingProducer {
 
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
   // message and will probably send one. Any thread.
-  void expectPush() const noexcept { lines::request(&next()); }
+  void expectPush() const noexcept {
+    if (lines::requestsReadLines()) lines::request(&next());
+  }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
   // Messages that the consumer has not taken, never more than were pushed.
@@ -118,7 +121,7 @@ class RingProducer {
   // Lines to claim at once, until the next look at the consumer. In a stream, many: its consumer
   // keeps a distance. Otherwise few: the consumer may be about to read a slot that waits for the
   // transfers of these lines. None when messages go there and back one by one: the consumer polls
-  // the next slot and takes its line back at once.
+  // the next slot and takes its line back at once. There, expectPush() requests the next line.
   static constexpr std::uint64_t kFewClaimed = 8, kManyClaimed = 32;
   static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
   // Whether this side was idle before nearly each of the messages since the last call.

@@ -3,7 +3,7 @@
 // the second one memory, with weak memory. Either process may be killed before any step.
 //
 //   MODELS  shm/ring.h: RingProducer tryPush hasFree tryMove
-//   MODELS  shm/ring.h: RingConsumer hasMessage sequence tryMove begin end
+//   MODELS  shm/ring_consumer.h: RingConsumer hasMessage sequence tryMove begin end
 //   MODELS  shm/link.cpp: tryAllowMore
 //   HOLDS   each message arrives once and in order, whenever the second ring gets its memory; no
 //           message waits forever

@@ -6,6 +6,7 @@
 //
 //   copyWords<32>(to, from);            // bytes, read in words of 32 bits
 //   copyField(to.length, from.length);  // one field, at its own width
+//   alone(from.type);                   // a number that is not loaded with its neighbour
 //   joined(first, second);              // two neighbours in memory as one number
 //
 // A message is copied right after its fields were written one by one. A memcpy of constant length
@@ -33,8 +34,8 @@ template <class Value>
   asm("" : "+r"(value));
   return value;
 }
-// The same number with 64 bits: the compiler may not save 32 bits on the stack and load 64, because
-// a shift drops the rest.
+// The same number with 64 bits, in a register. Otherwise the compiler may save 32 bits on the stack
+// and load 64, since a shift drops the rest.
 [[nodiscard]] inline std::uint64_t widened(std::uint32_t number) noexcept {
   return alone(std::uint64_t{number});
 }
