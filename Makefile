@@ -15,7 +15,8 @@
 
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
-CTEST_FLAGS ?= --parallel $(shell expr 2 \* $(JOBS))
+# Many tests mostly wait.
+CTEST_FLAGS ?= --parallel $(shell expr 4 \* $(JOBS))
 PRESETS := release debug edit asan tsan
 TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'

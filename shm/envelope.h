@@ -66,7 +66,7 @@ struct FirstBody {
   std::uint64_t first, second, third;
 
   [[nodiscard]] static FirstBody of(const std::byte* bytes) noexcept {
-    const auto word = [&](int at) {
+    const auto word = [&](std::size_t at) {
       std::uint64_t value = 0;
       std::memcpy(&value, bytes + at * sizeof value, sizeof value);
       asm("" : "+r"(value));  // read once: a peer may change the bytes

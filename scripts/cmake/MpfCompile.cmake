@@ -27,8 +27,9 @@ target_compile_options(mpf_warnings INTERFACE $<$<CONFIG:Release>:-Wno-restrict>
 
 if(CMAKE_CXX_COMPILER_ID STREQUAL Clang) # for fuzzing
   add_compile_options("SHELL:-include ${CMAKE_SOURCE_DIR}/scripts/kj_for_clang.h")
-  # In libstdc++ 12 itself.
-  target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations)
+  # In libstdc++ 12 itself, and in macros of KJ.
+  target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations
+    -Wno-gnu-statement-expression-from-macro-expansion)
 endif()
 
 set(MPF_SANITIZE "" CACHE STRING
