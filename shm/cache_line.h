@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// lines: fetches cache lines for this processor before it writes to them. The data stay the same.
+// lines: fetches cache lines for this processor before it writes to them, and passes lines on after
+// it has written them. The data stay the same.
 //
 // A line that another processor has read must come back before a write to it takes effect. An Intel
 // processor fetches it with prefetchw, without waiting (those before Broadwell ignore prefetchw).
 // On an AMD processor (Zen 3), prefetchw does not fetch such a line; only a write does.
 //
-// Threads  request(): any; claim(): the thread that may write the field.
+// Threads  request(), offer(): any; claim(): the thread that may write the field.
 #pragma once
 
 namespace mpf::lines {
@@ -35,6 +36,16 @@ void claim(T& field) noexcept {
   if (requestsReadLines()) return request(&field);
   volatile T& same = field;
   same = same;
+}
+
+// Moves the line at `address` from this processor to the cache that all processors share, where
+// another one reads or claims it sooner. Processors without cldemote do nothing.
+inline void offer(const void* address) noexcept {
+#if defined(__x86_64__)
+  asm volatile("cldemote %0" : : "m"(*static_cast<const char*>(address)));
+#else
+  static_cast<void>(address);
+#endif
 }
 
 }  // namespace mpf::lines

@@ -10,6 +10,7 @@
 #include <mpf/clock.h>
 
 #include "base/step.h"
+#include "shm/cache_line.h"
 #include "shm/notice_batch.h"
 #include "shm/segment_name.h"
 
@@ -244,13 +245,16 @@ LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> 
   auto own = pool_.tryFind(body.data());
   const auto foreign = own ? std::nullopt : borrowed_.tryFind(body.data());
   const bool inPlace = own || foreign;
+  const auto* start = body.data();
   if (!inPlace) {
     const auto chunk = pool_.tryAlloc(body.size());
     if (!chunk) return LinkSend::noMemory;
     std::memcpy(chunk->data, body.data(), body.size());
     MPF_STEP(chunk_filled);
+    start = chunk->data;
     own = chunk->ref;
   }
+  lines::offer(start);  // the receiver looks at the length there
   if (own) pool_.lend(*own);
   MPF_STEP(chunk_lent);
   // hasFree() above has checked that it fits.
@@ -341,8 +345,6 @@ std::int64_t Link::timeIfDue(bool isPolled) noexcept {
   return nowNs;
 }
 
-std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept { return pool_.tryAlloc(bytes); }
-
 void Link::release(const std::byte* data) noexcept {
   if (const auto own = pool_.tryFind(data)) {
     pool_.free(*own);
@@ -375,8 +377,6 @@ std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) try {
   borrowed_.giveBack(ref);
   throw ChunkUnavailable();
 }
-
-void Link::watch() noexcept { inWatch_.store(layout::Watch::polled, std::memory_order_relaxed); }
 
 void Link::letPeerSendUnfenced() noexcept {
   if (!expedited_barrier::tryRegister() || peer_->header().takesBarriers == 0) return;

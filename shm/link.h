@@ -204,7 +204,7 @@ class Link {
   [[nodiscard]] RingProducer& outgoing() noexcept { return out_; }
 
   // Allocates a chunk for a body; nullopt if there is no memory for it.
-  std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept;
+  std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept { return pool_.tryAlloc(bytes); }
   // Frees one of our chunks or returns a borrowed one; `data` points to the start of the chunk.
   void release(const std::byte* data) noexcept;
 
@@ -230,7 +230,7 @@ class Link {
   std::optional<Chunk> tryChunk(std::uint32_t bodyBytes);
 
   // Announces that we poll this link: the peer need not set our ready bit.
-  void watch() noexcept;
+  void watch() noexcept { inWatch_.store(layout::Watch::polled, std::memory_order_relaxed); }
   // For a link that we poll and that is busy: lets the peer send without a fence, if barriers reach
   // the peer.
   void letPeerSendUnfenced() noexcept;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/step.h"
+#include "shm/cache_line.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -104,7 +105,9 @@ std::optional<Chunk> PoolOwner::tryReceiveBack(const layout::ChunkRef& ref) noex
   auto& bulk = bulks_[ref.segment];
   bulk.states[ref.chunk] = ChunkState::held;
   MPF_STEP(chunk_back);
-  return Chunk{bulk.chunk(ref.chunk), bulk.chunkBytes, ref};
+  const Chunk chunk{bulk.chunk(ref.chunk), bulk.chunkBytes, ref};
+  lines::request(chunk.data);  // the next message writes its header there
+  return chunk;
 }
 
 void PoolOwner::free(const layout::ChunkRef& ref) noexcept {

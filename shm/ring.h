@@ -88,6 +88,9 @@ class RingProducer {
       detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     else if (!body.empty()) std::memcpy(first.body.data(), body.data(), body.size());
     publish(first, 1);
+    // In a stream the receiver is behind, and this would only cost time. Its messages leave slots
+    // for those that are waited for.
+    if (reserve == 0) lines::offer(&first);
     return true;
   }
 

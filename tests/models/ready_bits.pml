@@ -7,7 +7,8 @@
 //           ─ more left? set bit of the word ─ poll or revisit link
 //
 //   MODELS  shm/link.h: afterPush
-//   MODELS  shm/link.cpp: afterFencedPush watch letPeerSendUnfenced unwatch execute
+//   MODELS  shm/link.cpp: afterFencedPush letPeerSendUnfenced unwatch execute
+//   MODELS  shm/link.h: watch
 //   MODELS  shm/window.cpp: notify
 //   MODELS  shm/ready_bits.cpp: set tryTakeFrom
 //   MODELS  shm/hot_links.cpp: tryAdd cool
