@@ -9,6 +9,10 @@
 // Threads  request(), offer(): any; claim(): the thread that may write the field.
 #pragma once
 
+#include <sched.h>
+
+#include <cstdint>
+
 namespace mpf::lines {
 
 // Fetches the line at `address` for writing, if the processor can do this without a write.
@@ -46,6 +50,11 @@ inline void offer(const void* address) noexcept {
 #else
   static_cast<void>(address);
 #endif
+}
+
+// 1 + the number of the processor of this thread, which may change at any time.
+[[nodiscard]] inline std::uint32_t thisProcessor() noexcept {
+  return static_cast<std::uint32_t>(sched_getcpu()) + 1;
 }
 
 }  // namespace mpf::lines

@@ -35,7 +35,7 @@ Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::str
               }),
       mode_(mode),
       readyBits_(window_.hints()),
-      hot_(readyBits_),
+      hot_(readyBits_, mode != WaitMode::block),
       knocks_(window_.hints()),
       peers_(backplane_, [this] {
         peerDied_.store(true, std::memory_order_relaxed);

@@ -28,7 +28,9 @@ class HotLinks {
   // barrier in all processes (15 us), so a link that sleeps after each message never gets there.
   static constexpr std::uint32_t kUnfencedAfter = 1024;
 
-  explicit HotLinks(ReadyBits& readyBits) noexcept : readyBits_(readyBits) {}
+  //   pollsInWaits   whether the owner polls while it waits; otherwise it sleeps at once
+  HotLinks(ReadyBits& readyBits, bool pollsInWaits) noexcept
+      : readyBits_(readyBits), pollsInWaits_(pollsInWaits) {}
   HotLinks(const HotLinks&) = delete;
   HotLinks& operator=(const HotLinks&) = delete;
 
@@ -79,6 +81,7 @@ class HotLinks {
   void noteEvents(const Hot& cooled) noexcept;
 
   ReadyBits& readyBits_;
+  const bool pollsInWaits_;
   std::array<Hot, kCapacity> hot_{};
   std::size_t size_ = 0;
   Hot* turn_ = hot_.data();  // the link that had its turn last

@@ -288,6 +288,10 @@ struct LinkControl {
   Word32 serverIndex;  // bit of this link in the server window's ready bits; server
   // not 0: the second reply ring has memory, and maxOutstanding requests may be unanswered; client
   Word32 hasMoreReplies;
+  // 1 + the number of the processor on which the consumer polls the ring; 0: it does not poll, or
+  // does not say where. Only the speed depends on it.
+  Word32 requestsPolledOn;  // server
+  Word32 repliesPolledOn;  // client
   // The client writes these words for each message. The server seldom reads them.
   alignas(kPairBytes) RingControl replies;
   Word64 clientSent;

@@ -39,19 +39,18 @@ std::size_t linkBytes(const LinkGeometry& geometry) {
   return layout::linkBytes(geometry.queueSlots, geometry.replySlots, geometry.moreReplySlots);
 }
 
-layout::RingControl& ringControl(const Segment& segment, LinkSide producer) {
-  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
-  return producer == LinkSide::client ? control.requests : control.replies;
-}
-
-std::atomic<layout::Watch>& watchOf(const Segment& segment, LinkSide consumer) {
-  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
-  return consumer == LinkSide::client ? control.replyWatch : control.requestWatch;
-}
-
-layout::ReturnRing& returnRing(const Segment& segment, LinkSide poolOwner) {
-  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
-  return poolOwner == LinkSide::client ? control.requestChunks : control.replyChunks;
+// What a side writes about the messages and the bodies that it receives.
+struct ReceiverWords {
+  layout::RingControl& ring;
+  std::atomic<layout::Watch>& watch;
+  layout::Word32& polledOn;
+  layout::ReturnRing& returns;
+};
+ReceiverWords words(const Segment& segment, LinkSide of) {
+  auto& all = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
+  if (of == LinkSide::client)
+    return {all.replies, all.replyWatch, all.repliesPolledOn, all.replyChunks};
+  return {all.requests, all.requestWatch, all.requestsPolledOn, all.requestChunks};
 }
 
 LinkSide other(LinkSide side) {
@@ -167,16 +166,17 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       backplane_(backplane),
       side_(side),
       maxMessageBytes_(std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX)),
-      outWatch_(watchOf(segment_, other(side))),
-      inWatch_(watchOf(segment_, side)),
-      out_(slotsOf(segment_, side), slotCount(segment_, side), ringControl(segment_, side),
-           secondRing(segment_, side), &in_),
+      outWatch_(words(segment_, other(side)).watch),
+      inWatch_(words(segment_, side).watch),
+      out_(slotsOf(segment_, side), slotCount(segment_, side), words(segment_, other(side)).ring,
+           secondRing(segment_, side), &in_, &words(segment_, other(side)).polledOn),
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)),
-          ringControl(segment_, other(side)), secondRing(segment_, other(side))),
+          words(segment_, side).ring, secondRing(segment_, other(side)),
+          &words(segment_, side).polledOn),
       pool_(poolPlace(segment_, backplane_, side), {rights.mode & 0666, rights.group, rights.user},
-            segment_.header().maxPoolBytes, returnRing(segment_, side)),
+            segment_.header().maxPoolBytes, words(segment_, other(side)).returns),
       borrowed_(poolPlace(segment_, backplane_, other(side)), segment_.header().maxPoolBytes,
-                returnRing(segment_, other(side))),
+                words(segment_, side).returns),
       fanOut_(backplane_, segment_.header().serverWindow) {}
 
 Link::~Link() {
@@ -254,7 +254,7 @@ LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> 
     start = chunk->data;
     own = chunk->ref;
   }
-  lines::offer(start);  // the receiver looks at the length there
+  if (out_.isPolledElsewhere()) lines::offer(start);  // the receiver looks at the length there
   if (own) pool_.lend(*own);
   MPF_STEP(chunk_lent);
   // hasFree() above has checked that it fits.
@@ -385,6 +385,7 @@ void Link::letPeerSendUnfenced() noexcept {
 }
 
 Link::Barrier Link::unwatch() noexcept {
+  in_.showPolling(false);
   inWatch_.store(layout::Watch::unwatched, std::memory_order_relaxed);
   return std::exchange(isUnfenced_, false) ? Barrier::acrossProcesses : Barrier::fence;
 }

@@ -52,13 +52,16 @@ namespace mpf {
 class RingProducer {
  public:
   //   incoming   the ring of the other direction, if there is one
+  //   polledOn   shows on which processor the consumer polls; nullptr: nothing does
   RingProducer(layout::Slot* slots, std::uint32_t capacity, const layout::RingControl& consumer,
-               const SecondRing& second = {}, const RingConsumer* incoming = nullptr) noexcept
+               const SecondRing& second = {}, const RingConsumer* incoming = nullptr,
+               const layout::Word32* polledOn = nullptr) noexcept
       : slots_(slots),
         mask_(capacity - 1),
         consumer_(consumer),
         second_(second),
         incoming_(incoming),
+        polledOn_(polledOn),
         next_(slots) {}
 
   // Pushes `body` (at most layout::kInlineBodyBytes) and returns true. If fewer than `reserve` free
@@ -90,9 +93,11 @@ class RingProducer {
     publish(first, 1);
     // In a stream the receiver is behind, and this would only cost time. Its messages leave slots
     // for those that are waited for.
-    if (reserve == 0) lines::offer(&first);
+    if (isPolledElsewhere_ && reserve == 0) lines::offer(&first);
     return true;
   }
+  // Whether the consumer polls the ring on another processor, as far as we looked.
+  [[nodiscard]] bool isPolledElsewhere() const noexcept { return isPolledElsewhere_; }
 
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
   // message and will probably send one. Any thread.
@@ -163,6 +168,8 @@ class RingProducer {
   // processor overlap; those of messages do not, because the stores of one message fill the store
   // buffer. If claim_ is 0, the next claim comes after the slots that are known to be free.
   [[gnu::noinline]] void claimLines() noexcept {
+    const auto polledOn = polledOn_ != nullptr ? polledOn_->load(std::memory_order_relaxed) : 0;
+    isPolledElsewhere_ = polledOn != 0 && polledOn != lines::thisProcessor();
     claimed_ = claim_ == 0 ? freeEnd_ : std::min(freeEnd_, pushed_ + claim_);
     if (claim_ == 0) return;
     if (claimed_ == freeEnd_) __builtin_prefetch(&consumer_.freed);  // hasFreed() looks at it soon
@@ -215,6 +222,7 @@ class RingProducer {
   const layout::RingControl& consumer_;
   SecondRing second_;  // until we have moved there
   const RingConsumer* incoming_;
+  const layout::Word32* polledOn_;
   std::uint64_t usable_ = canMove() ? mask_ : mask_ + 1;  // slots that may hold messages
   // End of the slots that the consumer had freed when we looked last.
   std::uint64_t freeEnd_ = usable_;
@@ -223,6 +231,7 @@ class RingProducer {
   // Lines that are claimed at once; 0: none, as in the first lap, whose lines nobody has read.
   std::uint64_t claim_ = 0;
   std::uint64_t claimed_ = 0;  // the position of the next claim
+  bool isPolledElsewhere_ = false;  // at the last claim
   std::uint64_t judged_ = 0;  // messages at the last call of isOneByOne()
   std::uint64_t idleSeen_ = 0;  // timesIdle() then
   std::uint64_t messages_ = 0;

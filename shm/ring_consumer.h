@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "base/step.h"
+#include "shm/cache_line.h"
 #include "shm/cpu_relax.h"
 #include "shm/envelope.h"
 #include "shm/layout.h"
@@ -36,9 +37,15 @@ struct SecondRing {
 
 class RingConsumer {
  public:
+  //   polledOn   shows the producer on which processor the owner polls; nullptr: nothing does
   RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own,
-               const SecondRing& second = {}) noexcept
-      : slots_(slots), mask_(capacity - 1), own_(own), second_(second), first_(slots) {}
+               const SecondRing& second = {}, layout::Word32* polledOn = nullptr) noexcept
+      : slots_(slots),
+        mask_(capacity - 1),
+        own_(own),
+        second_(second),
+        polledOn_(polledOn),
+        first_(slots) {}
 
   [[nodiscard]] bool hasMessage() noexcept {
     const auto seen = sequence();
@@ -97,6 +104,14 @@ class RingConsumer {
     batchEnd_ = taken_ + batch_;
   }
 
+  // The owner begins or ends to poll.
+  void showPolling(bool polls) noexcept {
+    if (polledOn_ == nullptr) return;
+    const auto processor = polls ? lines::thisProcessor() : 0;
+    if (polledOn_->load(std::memory_order_relaxed) != processor)
+      polledOn_->store(processor, std::memory_order_relaxed);
+  }
+
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
   // How often onEmpty() was called after further messages. Any thread.
   [[nodiscard]] std::uint64_t timesIdle() const noexcept {
@@ -131,6 +146,8 @@ class RingConsumer {
     free();
     batchEnd_ = taken_ + batch_;
     lookAhead();
+    // The thread may have moved to another processor.
+    if (polledOn_ != nullptr && polledOn_->load(std::memory_order_relaxed) != 0) showPolling(true);
   }
 
   static constexpr std::uint64_t kMaxBatch = 16;  // slots
@@ -186,6 +203,7 @@ class RingConsumer {
   std::uint64_t mask_;  // number of slots - 1
   layout::RingControl& own_;
   SecondRing second_;  // until we have moved there
+  layout::Word32* polledOn_;
   const layout::Slot* first_;  // slot(taken_)
   std::uint64_t taken_ = 0;  // slots
   std::uint64_t freed_ = 0;  // private copy of own_.freed

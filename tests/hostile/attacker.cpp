@@ -138,6 +138,8 @@ void Attacker::goBack(Link& link) {
       static_cast<std::uint32_t>(random_.oneIn(2) ? layout::kReturnsFanOut | random_.below(8)
                                                   : random_.below(4) << 16 | random_.below(40)),
       std::memory_order_relaxed);
+  auto& polledOn = isClient ? control.repliesPolledOn : control.requestsPolledOn;
+  polledOn.store(static_cast<std::uint32_t>(random_.below(4)), std::memory_order_relaxed);
   control.hasMoreReplies.store(static_cast<std::uint32_t>(random_.below(2)),
                                std::memory_order_relaxed);
   control.repliesMoved.store(random_.oneIn(2) ? 0 : random_.nasty(), std::memory_order_relaxed);

@@ -97,9 +97,10 @@ inline nlohmann::json layoutFields() {
         {"fields",
          {MPF_FIELD(clientState), MPF_FIELD(serverState), MPF_FIELD(requestWatch),
           MPF_FIELD(replyWatch), MPF_FIELD(serverIndex), MPF_FIELD(hasMoreReplies),
-          MPF_FIELD(replies), MPF_FIELD(clientSent), MPF_FIELD(clientRefused),
-          MPF_FIELD(clientAnswered), MPF_FIELD(requests), MPF_FIELD(serverSent),
-          MPF_FIELD(repliesMoved), MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
+          MPF_FIELD(requestsPolledOn), MPF_FIELD(repliesPolledOn), MPF_FIELD(replies),
+          MPF_FIELD(clientSent), MPF_FIELD(clientRefused), MPF_FIELD(clientAnswered),
+          MPF_FIELD(requests), MPF_FIELD(serverSent), MPF_FIELD(repliesMoved),
+          MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
   }
   {
     using Struct = RingControl;
