@@ -42,7 +42,7 @@ class HotLinksTest : public ShmTest {
 
   std::unique_ptr<layout::WindowHints> hints_ = std::make_unique<layout::WindowHints>();
   ReadyBits readyBits_{*hints_};
-  std::optional<HotLinks> hot_{std::in_place, readyBits_};
+  std::optional<HotLinks> hot_{std::in_place, readyBits_, true};
   std::optional<End> server_{std::in_place, backplane_, "server", WaitMode::block};
   std::optional<End> client_{std::in_place, backplane_, "", WaitMode::block};
   std::vector<Connected> links_;
@@ -61,6 +61,20 @@ TEST_F(HotLinksTest, APolledLinkNeedsNoReadyBits) {
   EXPECT_EQ(hot_->size(), 0u);
   EXPECT_FALSE(isWatched(0));
   EXPECT_FALSE(takeReadyBit()) << "it has no event";
+}
+
+TEST_F(HotLinksTest, ThePeerSeesOnWhichProcessorAnOwnerPollsThatAlsoPollsInWaits) {
+  makeLinks(1);
+  const auto& polledOn = links_[0].server.control().requestsPolledOn;
+  for (const bool pollsInWaits : {true, false}) {
+    hot_.emplace(readyBits_, pollsInWaits);
+    ASSERT_TRUE(tryAdd(0));
+    EXPECT_EQ(polledOn.load(std::memory_order_relaxed) != 0, pollsInWaits);
+
+    hot_->remove(0);
+
+    EXPECT_EQ(polledOn.load(std::memory_order_relaxed), 0u);
+  }
 }
 
 TEST_F(HotLinksTest, LinksWithMessagesTakeTurns) {

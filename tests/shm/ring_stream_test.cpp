@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Ring: a stream of messages. The producer claims lines, the consumer keeps a distance.
+#include <sched.h>
+
 #include <cstring>
 #include <thread>
+#include <utility>
 
 #include "tests/shm/ring_fixture.h"
 #include "tests/support/watchdog.h"
@@ -43,6 +46,23 @@ TEST_F(RingTest, AClaimOfLinesChangesNothing) {
   EXPECT_EQ(std::memcmp(ringBytes() + sizeof(layout::Slot), before.data() + sizeof(layout::Slot),
                         kBytes - sizeof(layout::Slot)),
             0);
+}
+
+TEST_F(RingTest, TheProducerLooksWhereItsConsumerPolls) {
+  cpu_set_t here;
+  CPU_ZERO(&here);
+  CPU_SET(static_cast<std::size_t>(sched_getcpu()), &here);
+  ASSERT_EQ(sched_setaffinity(0, sizeof here, &here), 0);
+  const auto ours = lines::thisProcessor();
+  for (const auto& [polledOn, isElsewhere] :
+       {std::pair(0u, false), {ours, false}, {ours + 1, true}}) {
+    const layout::Word32 word{polledOn};
+    RingProducer producer(ring_, kCapacity, control_, {}, nullptr, &word);
+
+    ASSERT_TRUE(producer.tryPushShort([] { return Envelope{}; }, 0, {}, 0));
+
+    EXPECT_EQ(producer.isPolledElsewhere(), isElsewhere) << polledOn << ", we on " << ours;
+  }
 }
 
 // A ring that is long enough for the consumer to wait for the producer.
