@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// lines: fetches cache lines for this processor before it writes to them, and passes lines on after
-// it has written them. The data stay the same.
+// lines: fetches cache lines for this processor before it writes to them, and moves written lines
+// to the shared cache. The data stay the same.
 //
 // A line that another processor has read must come back before a write to it takes effect. An Intel
 // processor fetches it with prefetchw, without waiting (those before Broadwell ignore prefetchw).
@@ -42,8 +42,8 @@ void claim(T& field) noexcept {
   same = same;
 }
 
-// Moves the line at `address` from this processor to the cache that all processors share, where
-// another one reads or claims it sooner. Processors without cldemote do nothing.
+// Moves the line at `address` from this processor to the cache that all processors share, from
+// where another one gets it sooner. A processor without cldemote executes it as a NOP.
 inline void offer(const void* address) noexcept {
 #if defined(__x86_64__)
   asm volatile("cldemote %0" : : "m"(*static_cast<const char*>(address)));
@@ -52,7 +52,7 @@ inline void offer(const void* address) noexcept {
 #endif
 }
 
-// 1 + the number of the processor of this thread, which may change at any time.
+// 1 + the number of the processor of this thread, which may change at any time; 0: unknown.
 [[nodiscard]] inline std::uint32_t thisProcessor() noexcept {
   return static_cast<std::uint32_t>(sched_getcpu()) + 1;
 }

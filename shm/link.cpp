@@ -46,9 +46,9 @@ struct ReceiverWords {
   layout::Word32& polledOn;
   layout::ReturnRing& returns;
 };
-ReceiverWords words(const Segment& segment, LinkSide of) {
+ReceiverWords wordsOf(const Segment& segment, LinkSide receiver) {
   auto& all = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
-  if (of == LinkSide::client)
+  if (receiver == LinkSide::client)
     return {all.replies, all.replyWatch, all.repliesPolledOn, all.replyChunks};
   return {all.requests, all.requestWatch, all.requestsPolledOn, all.requestChunks};
 }
@@ -166,17 +166,17 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       backplane_(backplane),
       side_(side),
       maxMessageBytes_(std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX)),
-      outWatch_(words(segment_, other(side)).watch),
-      inWatch_(words(segment_, side).watch),
-      out_(slotsOf(segment_, side), slotCount(segment_, side), words(segment_, other(side)).ring,
-           secondRing(segment_, side), &in_, &words(segment_, other(side)).polledOn),
+      outWatch_(wordsOf(segment_, other(side)).watch),
+      inWatch_(wordsOf(segment_, side).watch),
+      out_(slotsOf(segment_, side), slotCount(segment_, side), wordsOf(segment_, other(side)).ring,
+           secondRing(segment_, side), &in_, &wordsOf(segment_, other(side)).polledOn),
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)),
-          words(segment_, side).ring, secondRing(segment_, other(side)),
-          &words(segment_, side).polledOn),
+          wordsOf(segment_, side).ring, secondRing(segment_, other(side)),
+          &wordsOf(segment_, side).polledOn),
       pool_(poolPlace(segment_, backplane_, side), {rights.mode & 0666, rights.group, rights.user},
-            segment_.header().maxPoolBytes, words(segment_, other(side)).returns),
+            segment_.header().maxPoolBytes, wordsOf(segment_, other(side)).returns),
       borrowed_(poolPlace(segment_, backplane_, other(side)), segment_.header().maxPoolBytes,
-                words(segment_, side).returns),
+                wordsOf(segment_, side).returns),
       fanOut_(backplane_, segment_.header().serverWindow) {}
 
 Link::~Link() {

@@ -52,7 +52,7 @@ namespace mpf {
 class RingProducer {
  public:
   //   incoming   the ring of the other direction, if there is one
-  //   polledOn   shows on which processor the consumer polls; nullptr: nothing does
+  //   polledOn   on which processor the consumer polls (LinkControl); nullptr: unknown
   RingProducer(layout::Slot* slots, std::uint32_t capacity, const layout::RingControl& consumer,
                const SecondRing& second = {}, const RingConsumer* incoming = nullptr,
                const layout::Word32* polledOn = nullptr) noexcept
@@ -91,12 +91,12 @@ class RingProducer {
       detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     else if (!body.empty()) std::memcpy(first.body.data(), body.data(), body.size());
     publish(first, 1);
-    // In a stream the receiver is behind, and this would only cost time. Its messages leave slots
-    // for those that are waited for.
+    // A message with a reserve is one of a stream. Its receiver is behind, so this would only cost
+    // time.
     if (isPolledElsewhere_ && reserve == 0) lines::offer(&first);
     return true;
   }
-  // Whether the consumer polls the ring on another processor, as far as we looked.
+  // Whether the consumer polled the ring on another processor, at the last claim.
   [[nodiscard]] bool isPolledElsewhere() const noexcept { return isPolledElsewhere_; }
 
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
@@ -131,6 +131,7 @@ class RingProducer {
   // transfers of these lines. None when messages go there and back one by one: the consumer polls
   // the next slot and takes its line back at once. There, expectPush() requests the next line.
   static constexpr std::uint64_t kFewClaimed = 8, kManyClaimed = 32;
+  static constexpr std::uint64_t kLookEvery = 16;  // slots, if no lines are claimed
   static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
   // Whether this side was idle before nearly each of the messages since the last call.
   [[nodiscard]] bool isOneByOne() noexcept;
@@ -166,11 +167,12 @@ class RingProducer {
   }
   // Claims the lines of the next slots at once, so that their transfers from the consumer's
   // processor overlap; those of messages do not, because the stores of one message fill the store
-  // buffer. If claim_ is 0, the next claim comes after the slots that are known to be free.
+  // buffer. If claim_ is 0, only looks where the consumer polls.
   [[gnu::noinline]] void claimLines() noexcept {
     const auto polledOn = polledOn_ != nullptr ? polledOn_->load(std::memory_order_relaxed) : 0;
-    isPolledElsewhere_ = polledOn != 0 && polledOn != lines::thisProcessor();
-    claimed_ = claim_ == 0 ? freeEnd_ : std::min(freeEnd_, pushed_ + claim_);
+    const auto here = lines::thisProcessor();
+    isPolledElsewhere_ = polledOn != 0 && here != 0 && polledOn != here;
+    claimed_ = std::min(freeEnd_, pushed_ + (claim_ == 0 ? kLookEvery : claim_));
     if (claim_ == 0) return;
     if (claimed_ == freeEnd_) __builtin_prefetch(&consumer_.freed);  // hasFreed() looks at it soon
     for (auto position = pushed_; position < claimed_; ++position)

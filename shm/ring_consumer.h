@@ -37,7 +37,7 @@ struct SecondRing {
 
 class RingConsumer {
  public:
-  //   polledOn   shows the producer on which processor the owner polls; nullptr: nothing does
+  //   polledOn   on which processor the owner polls (LinkControl); nullptr: nobody is told
   RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own,
                const SecondRing& second = {}, layout::Word32* polledOn = nullptr) noexcept
       : slots_(slots),
@@ -104,7 +104,7 @@ class RingConsumer {
     batchEnd_ = taken_ + batch_;
   }
 
-  // The owner begins or ends to poll.
+  // The owner starts or stops polling.
   void showPolling(bool polls) noexcept {
     if (polledOn_ == nullptr) return;
     const auto processor = polls ? lines::thisProcessor() : 0;

@@ -6,9 +6,8 @@
 //   owner   clear bit of the word ─ read bits ─ clear bit of the link
 //           ─ more left? set bit of the word ─ poll or revisit link
 //
-//   MODELS  shm/link.h: afterPush
+//   MODELS  shm/link.h: afterPush watch
 //   MODELS  shm/link.cpp: afterFencedPush letPeerSendUnfenced unwatch execute
-//   MODELS  shm/link.h: watch
 //   MODELS  shm/window.cpp: notify
 //   MODELS  shm/ready_bits.cpp: set tryTakeFrom
 //   MODELS  shm/hot_links.cpp: tryAdd cool

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "base/expedited_barrier.h"
+#include "shm/cache_line.h"
 #include "tests/shm/endpoint_pair.h"
+#include "tests/shm/pinned.h"
 #include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
@@ -63,13 +65,14 @@ TEST_F(HotLinksTest, APolledLinkNeedsNoReadyBits) {
   EXPECT_FALSE(takeReadyBit()) << "it has no event";
 }
 
-TEST_F(HotLinksTest, ThePeerSeesOnWhichProcessorAnOwnerPollsThatAlsoPollsInWaits) {
+TEST_F(HotLinksTest, AnOwnerThatPollsInWaitsSaysOnWhichProcessor) {
+  const Pinned pinned;
   makeLinks(1);
   const auto& polledOn = links_[0].server.control().requestsPolledOn;
   for (const bool pollsInWaits : {true, false}) {
     hot_.emplace(readyBits_, pollsInWaits);
     ASSERT_TRUE(tryAdd(0));
-    EXPECT_EQ(polledOn.load(std::memory_order_relaxed) != 0, pollsInWaits);
+    EXPECT_EQ(polledOn.load(std::memory_order_relaxed), pollsInWaits ? lines::thisProcessor() : 0);
 
     hot_->remove(0);
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Ring: a stream of messages. The producer claims lines, the consumer keeps a distance.
-#include <sched.h>
-
 #include <cstring>
 #include <thread>
 #include <utility>
 
+#include "shm/cache_line.h"
+#include "tests/shm/pinned.h"
 #include "tests/shm/ring_fixture.h"
 #include "tests/support/watchdog.h"
 
@@ -49,19 +49,32 @@ TEST_F(RingTest, AClaimOfLinesChangesNothing) {
 }
 
 TEST_F(RingTest, TheProducerLooksWhereItsConsumerPolls) {
-  cpu_set_t here;
-  CPU_ZERO(&here);
-  CPU_SET(static_cast<std::size_t>(sched_getcpu()), &here);
-  ASSERT_EQ(sched_setaffinity(0, sizeof here, &here), 0);
-  const auto ours = lines::thisProcessor();
+  const Pinned pinned;
+  const auto here = lines::thisProcessor();
   for (const auto& [polledOn, isElsewhere] :
-       {std::pair(0u, false), {ours, false}, {ours + 1, true}}) {
+       {std::pair(0u, false), {here, false}, {here + 1, true}}) {
     const layout::Word32 word{polledOn};
     RingProducer producer(ring_, kCapacity, control_, {}, nullptr, &word);
 
     ASSERT_TRUE(producer.tryPushShort([] { return Envelope{}; }, 0, {}, 0));
 
-    EXPECT_EQ(producer.isPolledElsewhere(), isElsewhere) << polledOn << ", we on " << ours;
+    EXPECT_EQ(producer.isPolledElsewhere(), isElsewhere) << polledOn << ", we on " << here;
+  }
+}
+
+TEST_F(RingTest, AConsumerThatPollsFollowsItsThreadToAnotherProcessor) {
+  const Pinned pinned;
+  const auto here = lines::thisProcessor();
+  for (const auto& [before, after] : {std::pair(0u, 0u), {here + 1, here}}) {
+    layout::Word32 word{before};
+    RingConsumer consumer(ring_, kCapacity, control_, {}, &word);
+
+    for (std::uint32_t i = 0; i < kCapacity; ++i) {
+      static_cast<void>(consumer.begin());
+      consumer.end();
+    }
+
+    EXPECT_EQ(word.load(std::memory_order_relaxed), after);
   }
 }
 
