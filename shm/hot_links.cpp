@@ -16,8 +16,7 @@ bool HotLinks::tryAdd(std::uint32_t index, Link& link) noexcept {
   }
   if (size_ == kCapacity) return false;
   hot_[size_++] = {index, 0, 0, &link};
-  link.watch();
-  if (pollsInWaits_) link.incoming().showPolling(true);
+  link.watch(pollsInWaits_);
   return true;
 }
 

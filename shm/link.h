@@ -229,8 +229,12 @@ class Link {
   //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
   std::optional<Chunk> tryChunk(std::uint32_t bodyBytes);
 
-  // Announces that we poll this link: the peer need not set our ready bit.
-  void watch() noexcept { inWatch_.store(layout::Watch::polled, std::memory_order_relaxed); }
+  // Announces that we poll this link: the peer need not set our ready bit. `pollsInWaits`: also
+  // while we wait; then the peer is told on which processor.
+  void watch(bool pollsInWaits) noexcept {
+    inWatch_.store(layout::Watch::polled, std::memory_order_relaxed);
+    in_.showPolling(pollsInWaits);
+  }
   // For a link that we poll and that is busy: lets the peer send without a fence, if barriers reach
   // the peer.
   void letPeerSendUnfenced() noexcept;

@@ -68,7 +68,7 @@ void Talk::turn(std::uint64_t value) {
   sendArray(*channel_, static_cast<std::uint32_t>(value), value % 2048);
   if (fanOut_ != nullptr) publish(value);
   static_cast<void>(link.outgoing().isTaken(value % 8));
-  if (value % 2 != 0) link.watch();
+  if (value % 2 != 0) link.watch(true);
   else Link::execute(link.unwatch());
   link.notifyPeer();
 }

@@ -183,7 +183,7 @@ TEST_F(LinkTest, SetsTheReadyBitWhileTheReceiverDoesNotPoll) {
   const auto takeBits = [&] { return hints.readyBits[0].exchange(0, std::memory_order_relaxed); };
   takeBits();
 
-  link.server.watch();
+  link.server.watch(true);
   ASSERT_EQ(sendBody(link.client, filled(1)), LinkSend::sent);
   EXPECT_EQ(takeBits(), 0u);
   Link::execute(link.server.unwatch());
@@ -227,7 +227,7 @@ TEST_F(LinkTest, TimesSlowMessagesToASleepingPeerAndOneIn64ToAPollingOne) {
 
   EXPECT_EQ(timedOf(10), 10);
 
-  link.server.watch();
+  link.server.watch(true);
   timedOf(54);
   EXPECT_EQ(timedOf(256), 4);
 
