@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstring>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -18,14 +17,13 @@ constexpr std::int64_t kSlowNs = 10'000;
 template <class T>
 constexpr bool kHasCmd = requires { T::cmd; };
 
-// Indexed by the number of a type: whether it has a `cmd`, which has the same offset in all types.
-constexpr std::size_t kCmdOffset = offsetof(Int32, cmd);
+// Indexed by the number of a type: whether it has a `cmd`.
 template <class... T>
 constexpr auto typesWithCmd(std::type_identity<std::tuple<T...>> /*types*/) {
   std::array<bool, sizeof...(T) + 1> has{};
   const auto look = [&]<class Body>(std::type_identity<Body>) {
     if constexpr (kHasCmd<Body>) {
-      static_assert(offsetof(Body, cmd) == kCmdOffset);
+      static_assert(offsetof(Body, cmd) == layout::kCmdOffset);
       has[static_cast<std::size_t>(Body::kType)] = true;
     }
   };
@@ -33,19 +31,16 @@ constexpr auto typesWithCmd(std::type_identity<std::tuple<T...>> /*types*/) {
   return has;
 }
 
-std::int32_t cmdOf(const Message& request) noexcept {
+bool hasCmd(MessageType type) noexcept {
   static constexpr auto kTypes = typesWithCmd(std::type_identity<MessageTypes>{});
-  const auto type = static_cast<std::size_t>(request.getType());
-  std::int32_t cmd = 0;
-  if (type < kTypes.size() && kTypes[type])
-    std::memcpy(&cmd, request.body().data() + kCmdOffset, sizeof cmd);
-  return cmd;
+  const auto at = static_cast<std::size_t>(type);
+  return at < kTypes.size() && kTypes[at];
 }
 
 }  // namespace
 
-void Progress::begin(const Message& request) noexcept {
-  const Handling handling{static_cast<std::uint16_t>(request.getType()), cmdOf(request)};
+void Progress::begin(MessageType type, std::int32_t cmd) noexcept {
+  const Handling handling{static_cast<std::uint16_t>(type), hasCmd(type) ? cmd : 0};
   control_.handling.store(handling.word(), std::memory_order_relaxed);
   isHandling_ = true;
 }

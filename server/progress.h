@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include <mpf/message.h>
+#include <mpf/message_types.h>
 
 #include "shm/layout.h"
 
@@ -17,8 +17,9 @@ class Progress {
  public:
   explicit Progress(layout::WindowControl& control) noexcept : control_(control) {}
 
-  // Shows `request`, until end(), as the one that the server handles.
-  void begin(const Message& request) noexcept;
+  // Shows a request, until end(), as the one that the server handles.
+  //   cmd  the bytes of its body at layout::kCmdOffset
+  void begin(MessageType type, std::int32_t cmd) noexcept;
   void end() noexcept;
   // Stores the time of the request that was taken last.
   void note(std::int64_t nowNs) noexcept;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/server_core.h"
 
+#include <cstring>
 #include <fmt/format.h>
 #include <stdexcept>
 
@@ -99,13 +100,13 @@ void ServerCore::handleControlEvents() {
 }
 
 inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestId, Times times,
-                                  const Message& message) noexcept {
+                                  MessageType type, std::int32_t cmd) noexcept {
   if (times.sentTick != 0) {
     noteTimes(connection, requestId, times.sentTick);
   } else if (progress_.isDue()) {
     progress_.note(Clock::nowNs());
   }
-  progress_.begin(message);
+  progress_.begin(type, cmd);
   takeBeforeNs_ = times.deadlineNs;
 }
 
@@ -140,13 +141,17 @@ bool ServerCore::hasRequest(Connection& connection) noexcept {
                                                               const Envelope& envelope) noexcept {
   auto message = connection.channel->finishShort(
       envelope, connection.routeOf(envelope.requestId, &keeper_), 0);
-  noteTaken(connection, envelope.requestId, {envelope.sentTick, envelope.timeNs}, message);
+  std::int32_t cmd = 0;
+  std::memcpy(&cmd, message.body().data() + layout::kCmdOffset, sizeof cmd);
+  noteTaken(connection, envelope.requestId, {envelope.sentTick, envelope.timeNs}, message.getType(),
+            cmd);
   return message;
 }
 
 // Returns an empty handle if the body cannot be read.
 Message ServerCore::finishLong(Connection& connection, BodyFields fields, RequestMarks marks,
                                Times times) noexcept {
+  const auto cmd = connection.channel->cmdOfLong(fields);
   MessageLink::Finish finish{};
   auto message = connection.channel->finishLong(
       fields,
@@ -161,7 +166,7 @@ Message ServerCore::finishLong(Connection& connection, BodyFields fields, Reques
       replies_.sendFate(connection, marks, Fate::refused);
       break;
     case MessageLink::Finish::message:
-      noteTaken(connection, marks.requestId, times, message);
+      noteTaken(connection, marks.requestId, times, message.getType(), cmd);
       break;
   }
   return message;

@@ -81,8 +81,8 @@ class ServerCore {
   };
   Message finishLong(Connection& connection, BodyFields fields, RequestMarks marks,
                      Times times) noexcept;
-  void noteTaken(Connection& connection, std::uint32_t requestId, Times times,
-                 const Message& message) noexcept;
+  void noteTaken(Connection& connection, std::uint32_t requestId, Times times, MessageType type,
+                 std::int32_t cmd) noexcept;
   void closeForProtocolError(Connection& connection) noexcept;
   static bool hasPassed(std::int64_t deadlineNs) noexcept;
   void noteTimes(Connection& connection, std::uint32_t requestId, std::uint32_t sentTick) noexcept;

@@ -250,8 +250,13 @@ struct ChunkRef {
   std::uint32_t side;  // owner of the pool: 0 the client, 1 the server; kFanOutSide
   // kFanOutSide: messages of this request that the server has dropped since the last one
   std::uint32_t missed;
+  // Of a request: the word at kCmdOffset of its body, so that the server can show the `cmd` without
+  // a transfer of the first line of the body.
+  std::uint32_t cmd = 0;
 };
-static_assert(sizeof(ChunkRef) == 16);
+static_assert(sizeof(ChunkRef) == 20);
+// Where the bodies of types with a `cmd` have it.
+inline constexpr std::size_t kCmdOffset = 4;
 
 // How the consumer of a ring looks for messages. With `polledUnfenced`, the producer needs no fence
 // between its message and its load of this value: a consumer that stops polling stores `unwatched`,

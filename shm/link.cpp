@@ -10,7 +10,6 @@
 #include <mpf/clock.h>
 
 #include "base/step.h"
-#include "shm/cache_line.h"
 #include "shm/notice_batch.h"
 #include "shm/segment_name.h"
 
@@ -245,20 +244,20 @@ LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> 
   auto own = pool_.tryFind(body.data());
   const auto foreign = own ? std::nullopt : borrowed_.tryFind(body.data());
   const bool inPlace = own || foreign;
-  const auto* start = body.data();
   if (!inPlace) {
     const auto chunk = pool_.tryAlloc(body.size());
     if (!chunk) return LinkSend::noMemory;
     std::memcpy(chunk->data, body.data(), body.size());
     MPF_STEP(chunk_filled);
-    start = chunk->data;
     own = chunk->ref;
   }
-  if (out_.isPolledElsewhere()) lines::offer(start);  // the receiver looks at the length there
   if (own) pool_.lend(*own);
   MPF_STEP(chunk_lent);
+  auto ref = own ? *own : *foreign;
+  if (side_ == LinkSide::client)
+    std::memcpy(&ref.cmd, body.data() + layout::kCmdOffset, sizeof ref.cmd);
   // hasFree() above has checked that it fits.
-  if (!trySendRef(envelope, body.size(), own ? *own : *foreign, reserve)) return LinkSend::full;
+  if (!trySendRef(envelope, body.size(), ref, reserve)) return LinkSend::full;
   return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }
 
@@ -281,8 +280,8 @@ bool Link::trySendRef(const Envelope& envelope, std::size_t bodyBytes, const lay
   auto marked = envelope;
   marked.flags |= layout::kSlotChunk;
   // As long as a slot has room for: the ring copies such a body in words.
-  const std::array<std::uint32_t, layout::kFirstSlotBodyBytes / 4> body{ref.segment, ref.chunk,
-                                                                        ref.side, ref.missed};
+  const std::array<std::uint32_t, layout::kFirstSlotBodyBytes / 4> body{
+      ref.segment, ref.chunk, ref.side, ref.missed, ref.cmd};
   const auto bytes = static_cast<std::uint32_t>(bodyBytes);
   if (!out_.tryPushShort([&] { return marked; }, bytes, std::as_bytes(std::span(body)), reserve))
     return false;
@@ -326,6 +325,7 @@ void Link::afterFencedPush() noexcept {
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
   if (!peer_ || outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched) return;
+  untimedUntil_ = 0;  // the sampler chooses from now on
   // The receiver must wake up before the ring is full.
   const auto room = side_ == LinkSide::client ? header().queueSize : geometry_.replySlots;
   NoticeBatch::notify(peer_, peerIndex_, room / 2);
@@ -333,11 +333,12 @@ void Link::afterFencedPush() noexcept {
 
 // Of the messages to a peer that polls, one in kMaxInterval is timed; of others, those that the
 // sampler chooses.
-std::int64_t Link::timeIfDue(bool isPolled) noexcept {
+std::int64_t Link::timeIfDue() noexcept {
   constexpr auto kInterval = TimeSampler::kMaxInterval;
   const auto sent = out_.messages();
+  const bool isPolled = outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched;
   if (!(isPolled ? sent % kInterval == 0 : sampler_.isDue(sent))) {
-    untimedUntil_ = (sent / kInterval + 1) * kInterval;
+    if (isPolled) untimedUntil_ = (sent / kInterval + 1) * kInterval;
     return 0;
   }
   const auto nowNs = Clock::nowNs();

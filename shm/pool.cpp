@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/step.h"
-#include "shm/cache_line.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -105,9 +104,7 @@ std::optional<Chunk> PoolOwner::tryReceiveBack(const layout::ChunkRef& ref) noex
   auto& bulk = bulks_[ref.segment];
   bulk.states[ref.chunk] = ChunkState::held;
   MPF_STEP(chunk_back);
-  const Chunk chunk{bulk.chunk(ref.chunk), bulk.chunkBytes, ref};
-  lines::request(chunk.data);  // the next message writes its header there
-  return chunk;
+  return Chunk{bulk.chunk(ref.chunk), bulk.chunkBytes, ref};
 }
 
 void PoolOwner::free(const layout::ChunkRef& ref) noexcept {

@@ -30,14 +30,14 @@
 //          destroys a handle calls the lender of its body.
 // Throws   duplicate() and copyOf(), which allocate; all other public functions are noexcept.
 // Crash    <mpf/message_client.h> and <mpf/message_server.h> describe what the peer sees.
-// Trust    a peer may write anything to a body in shared memory, at any time. adopt(), copyOf() and
-//          copyInline() check the body once and store its array length; tryAs(), valueAs() and
-//          MessageOf::setLength() use only the stored length.
+// Trust    a peer may write anything to a body in shared memory, at any time. The length of an array
+//          is therefore that of its body, and not the one that the peer wrote into the body.
 // Source   manual, "Message", "Overview". Free lists, toBuffer() and fromBuffer() are not needed.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -133,16 +133,16 @@ class Message {
   }
 
   // False when the type is unknown, or the body is misaligned, shorter than the fields of its type,
-  // or too short for the length of its array. The check ran when the handle received the body.
+  // or ends within an element of its array. The check ran when the handle received the body.
   [[nodiscard]] bool isSound() const noexcept { return state_.sound; }
-  // Number of elements of an array, as it was checked; 0 for scalars and invalid bodies.
+  // Number of elements of an array; 0 for scalars and invalid bodies.
   [[nodiscard]] std::uint32_t arrayLength() const noexcept { return state_.length; }
   // All bytes of the body, fields and elements, even when the body is invalid; valid as long as the
   // fields, empty for an empty handle.
   [[nodiscard]] std::span<const std::byte> body() const noexcept { return {data(), size()}; }
 
   // Copies type, clientType, clientExtra, time stamp, route and body; a large body is copied to the
-  // heap. The array length of the copy is the checked one. Only the original reports to the
+  // heap. Only the original reports to the
   // RouteKeeper: a request is not refused when only its copy is destroyed. A server may reply with
   // the copy.
   //   throws  std::bad_alloc
@@ -208,7 +208,7 @@ class Message {
     reset();
     setAll(type, static_cast<std::uint8_t>(size), attributes);
     fill(std::span<std::byte, kInlineBytes>(state_.at.inside));
-    checkInline();
+    check();
   }
   // Empties the handle: returns the body to its lender, and reports a request that has had no reply
   // to its RouteKeeper. Keeps clientType, clientExtra and the route, without its keeper.
@@ -309,7 +309,7 @@ class Message {
     std::int64_t timeStampNs = 0;
     std::int32_t clientType = 0;
     std::int32_t clientExtra = 0;
-    // Of an array: the checked number of elements. A peer cannot write here.
+    // Of an array: the number of its elements. A peer cannot write here.
     std::uint32_t length = 0;
     MessageType type = MessageType::none;
     std::uint8_t inlineSize = 0;  // kOutside: the body is out of line
@@ -345,30 +345,20 @@ class Message {
     state_.clientExtra = attributes.clientExtra;
     state_.timeStampNs = attributes.timeStampNs;
   }
-  // Sets `sound`, and `length` of a valid array.
+  // Sets `sound`, and `length` of a valid array, from the size of the body. Does not read the body:
+  // its first line may be with the processor that has written it.
   void check() noexcept {
-    if (!state_.isOutside()) return checkInline();
     const auto& layout = layoutOf(state_.type);
-    const auto& body = state_.at.body;
-    state_.sound = layout.headerBytes != 0 && body.size >= layout.headerBytes &&
-                   reinterpret_cast<std::uintptr_t>(body.data) % 8 == 0;
+    const auto bytes = size();
+    state_.sound = layout.headerBytes != 0 && bytes >= layout.headerBytes && isAligned();
     if (!state_.sound || layout.elementBytes == 0) return;
-    // Read once: a peer may change it between two reads.
-    checkLength(layout,
-                *reinterpret_cast<const volatile std::uint32_t*>(body.data + layout.lengthOffset));
+    const auto elements = (bytes - layout.headerBytes) >> std::countr_zero(layout.elementBytes);
+    state_.sound =
+        layout.headerBytes + elements * layout.elementBytes == bytes && elements <= UINT32_MAX;
+    if (state_.sound) state_.length = static_cast<std::uint32_t>(elements);
   }
-  // The same for a body inside the handle.
-  void checkInline() noexcept {
-    const auto& layout = layoutOf(state_.type);
-    state_.sound = layout.headerBytes != 0 && state_.inlineSize >= layout.headerBytes;
-    if (!state_.sound || layout.elementBytes == 0) return;
-    std::uint32_t length = 0;
-    std::memcpy(&length, state_.at.inside.data() + layout.lengthOffset, sizeof length);
-    checkLength(layout, length);
-  }
-  void checkLength(const BodyLayout& layout, std::uint32_t length) noexcept {
-    state_.sound = std::uint64_t{length} * layout.elementBytes <= size() - layout.headerBytes;
-    if (state_.sound) state_.length = length;
+  [[nodiscard]] bool isAligned() const noexcept {
+    return !state_.isOutside() || reinterpret_cast<std::uintptr_t>(state_.at.body.data) % 8 == 0;
   }
   // Makes the handle empty: neither the body nor the request is given back.
   void forget() noexcept {

@@ -21,7 +21,7 @@
 // Threads  plain data; the owner of the message handle is the only user of a body in this process.
 // Throws   nothing in this header throws or allocates.
 // Trust    a peer may write to a body while it is read: never use the field `length` as the length
-//          of an array. MessageOf::value() uses the length that was checked.
+//          of an array. MessageOf::value() uses the size of the body.
 // Source   manual, "Message", "StandardFieldsMessage" and the section of each type; types and
 //          fields have the names of the manual.
 #pragma once

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "shm/messages/message_link.h"
 
+#include <array>
+#include <cstddef>
+
 #include "shm/private_pages.h"
 
 namespace mpf {
@@ -28,6 +31,16 @@ bool MessageLink::isValidLong(BodyFields body) const noexcept {
   const auto room = link_->incoming().inlineCapacity();
   const bool isChunk = (body.flags & layout::kSlotChunk) != 0;
   return room != 0 && body.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room);
+}
+
+std::int32_t MessageLink::cmdOfLong(BodyFields body) const noexcept {
+  std::array<std::byte, layout::kFirstSlotBodyBytes> bytes;
+  link_->incoming().firstBody().copyTo(bytes.data());
+  const bool isChunk = (body.flags & layout::kSlotChunk) != 0;
+  std::int32_t cmd = 0;
+  const auto at = isChunk ? offsetof(layout::ChunkRef, cmd) : layout::kCmdOffset;
+  std::memcpy(&cmd, bytes.data() + at, sizeof cmd);
+  return cmd;
 }
 
 Message MessageLink::finishLong(BodyFields fields, const Message::Attributes& attributes,

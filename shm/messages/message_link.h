@@ -55,6 +55,8 @@ class MessageLink final : public BodyLender {
     ring.endOneSlot();
     return message;
   }
+  // Of the message begun, whose body is not isShort(): the bytes at layout::kCmdOffset of its body.
+  [[nodiscard]] std::int32_t cmdOfLong(BodyFields body) const noexcept;
   // `invalid`: the body is invalid. `unavailable`: the body cannot be mapped, because its owner
   // has ended or memory is short; the message is lost, but the link is sound.
   enum class Finish { message, invalid, unavailable };

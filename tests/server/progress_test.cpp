@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <memory>
 
-#include <mpf/message_of.h>
+#include <mpf/message_types.h>
 
 #include "shm/handling.h"
 
@@ -30,7 +30,7 @@ class ProgressTest : public testing::Test {
 TEST_F(ProgressTest, ShowsTheRequestUntilItHasBeenHandled) {
   EXPECT_FALSE(handling());
 
-  progress_.begin(Int32Message({.cmd = -7}));
+  progress_.begin(MessageType::int32, -7);
   const auto shown = handling();
   progress_.end();
 
@@ -41,7 +41,7 @@ TEST_F(ProgressTest, ShowsTheRequestUntilItHasBeenHandled) {
 }
 
 TEST_F(ProgressTest, ARequestWithoutACmdHasCmd0) {
-  progress_.begin(SerialConfigMessage({.stopBits = 2}));
+  progress_.begin(MessageType::serialConfig, 2);
 
   ASSERT_TRUE(handling());
   EXPECT_EQ(handling()->cmd, 0);

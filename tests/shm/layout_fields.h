@@ -128,9 +128,10 @@ inline nlohmann::json layoutFields() {
   }
   {
     using Struct = ChunkRef;
-    all["ChunkRef"] = {
-        {"bytes", sizeof(Struct)},
-        {"fields", {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(missed)}}};
+    all["ChunkRef"] = {{"bytes", sizeof(Struct)},
+                       {"fields",
+                        {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(missed),
+                         MPF_FIELD(cmd)}}};
   }
   {
     using Struct = RouterLine;

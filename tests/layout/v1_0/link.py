@@ -179,7 +179,8 @@ class Link:
             message.chunk = self.pool.lend(body)
         if message.chunk is not None:
             side, segment, chunk = message.chunk
-            body = b"".join(part.to_bytes(4, "little") for part in (segment, chunk, side, message.missed))
+            cmd = int.from_bytes(message.body[4:8], "little") if self.side == CLIENT else 0
+            body = b"".join(part.to_bytes(4, "little") for part in (segment, chunk, side, message.missed, cmd))
             message.flags |= CHUNK
         self.out.push(message, body, size)
         self.control[SENT[self.side]] = self.out.messages

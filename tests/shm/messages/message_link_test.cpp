@@ -98,6 +98,20 @@ TEST_P(ArrayLengths, Cross) {
 // In the first slot, in the handle, in several slots, in a chunk.
 INSTANTIATE_TEST_SUITE_P(OfEachKind, ArrayLengths, testing::Values(0, 2, 40, 10'000));
 
+TEST_F(MessageLinkTest, TheCmdOfALongRequestIsInItsSlot) {
+  for (const std::size_t length : {40, 10'000}) {  // in several slots, in a chunk
+    auto request = allocate(length);
+    request->cmd = -7;
+    ASSERT_TRUE(send(request) == LinkSend::sent || !request);
+
+    Envelope envelope;
+    ASSERT_TRUE(server_->hasMessage() && server_->tryBegin(envelope));
+
+    EXPECT_EQ(server_->cmdOfLong(envelope.body()), -7) << length;
+    server_->discard(envelope.body());
+  }
+}
+
 TEST_F(MessageLinkTest, AMessageThatIsRefusedStaysWithItsOwner) {
   auto message = Char8ArrayMessage::allocValue((1 << 20) + 1);  // Offer::maxMessageBytes
 

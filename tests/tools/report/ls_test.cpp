@@ -136,7 +136,7 @@ TEST_F(ReportTest, ABusyServerIsShownWithItsRequestAndTheTime) {
   openServer("dmm");
   connect();
   auto question = client_->alloc<Char8Array>(1);
-  *question = {.cmd = 3, .length = 1};
+  question->cmd = 3;
   ASSERT_EQ(client_->send(std::move(question)), SendResult::sent);
   Message inWork;
   while (!inWork) inWork = server_->receive();
