@@ -53,26 +53,39 @@ void Polling::drop(Polled& window) {
   window.poll();
 }
 
-// The event loop first runs all tasks that are ready, and looks at its descriptors. A task of
-// evalLast() would run before older ones of evalLast(): those that write to the lines.
+// The event loop first runs all tasks that are ready, and looks at its descriptors. Then it handles
+// what they have brought: tasks of evalLast() run in reverse order, so those that write to the
+// lines, which are newer, run before the next turn.
 kj::Promise<void> Polling::nextTurn() {
-  return port_.getTimer().afterDelay(0 * kj::NANOSECONDS).then([this] { return loop(); });
+  return port_.getTimer().afterDelay(0 * kj::NANOSECONDS).then([this] {
+    return kj::evalLast([this] { return loop(); });
+  });
 }
 
 kj::Promise<void> Polling::loop() {
   const auto nowNs = Clock::nowNs();
-  if (nowNs - lastTrafficNs_ >= budget_.ns() || !tryYield(nowNs)) {
+  ++idleTurns_;
+  if (nowNs - lastTrafficNs_ >= budget_.ns() || isCrowded_ || !tryYield(nowNs)) {
     end();
     return kj::READY_NOW;
   }
+  pollWindows();
+  return nextTurn();
+}
+
+void Polling::lookForAnswers() {
+  if (!isPolling_ || isCrowded_) return;
+  isCrowded_ = !tryYield(Clock::nowNs());
+  pollWindows();
+}
+
+void Polling::pollWindows() {
   // A window may be added or removed by the call.
   for (std::size_t at = 0; at < windows_.size(); ++at) windows_[at]->poll();
-  return nextTurn();
 }
 
 // Returns false if others use the processor for long: then a wake-up is earlier than the next turn.
 bool Polling::tryYield(std::int64_t nowNs) {
-  ++idleTurns_;
   ::sched_yield();
   const auto yieldNs = Clock::nowNs() - nowNs;
   processor_.noteYield(yieldNs, true);  // the budget ends empty ones
@@ -82,6 +95,7 @@ bool Polling::tryYield(std::int64_t nowNs) {
 // The last look at the windows may start to poll them again, or remove others.
 void Polling::end() {
   isPolling_ = false;
+  isCrowded_ = false;
   for (auto left = windows_.size(); left != 0 && !windows_.empty(); --left) {
     auto& window = *windows_.front();
     windows_.erase(windows_.begin());

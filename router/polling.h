@@ -46,6 +46,9 @@ class Polling {
   void noteTraffic();
   // As noteTraffic(), and polls this window, too, as long as no kMaxWindows others are busier.
   void add(Polled& window);
+  // Messages were handed over: if it polls, lets their receivers run that share the processor, and
+  // looks for their answers.
+  void lookForAnswers();
   // The window is destroyed.
   void remove(Polled& window) noexcept;
   [[nodiscard]] bool isPolling() const noexcept { return isPolling_; }
@@ -53,6 +56,7 @@ class Polling {
  private:
   kj::Promise<void> nextTurn();
   kj::Promise<void> loop();
+  void pollWindows();
   bool tryYield(std::int64_t nowNs);
   void end();
   static void drop(Polled& window);
@@ -63,6 +67,7 @@ class Polling {
   std::int64_t lastTrafficNs_ = 0;
   std::uint32_t idleTurns_ = 0;  // of the loop, since the last traffic
   bool isPolling_ = false;
+  bool isCrowded_ = false;  // others use the processor for long: the next turn ends the polling
   bool isReplacing_ = false;  // a window has its last look
   std::vector<Polled*> windows_;  // the one added last is at the end
   FatalTasks tasks_;

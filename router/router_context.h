@@ -40,6 +40,9 @@ struct RouterContext {
   void poll(Polled& window) const {
     if (polling != nullptr) polling->add(window);
   }
+  void lookForAnswers() const {
+    if (polling != nullptr) polling->lookForAnswers();
+  }
   void endPolling(Polled& window) const noexcept {
     if (polling != nullptr) polling->remove(window);
   }

@@ -28,6 +28,7 @@ Line::Events ServerRouter::lineEvents() {
       .onPlain = [this](PlainItem& item) { servers_.handle(item); },
       .onRoom = [this] { servers_.run(); },
       .onTraffic = [this] { servers_.onTraffic(); },
+      .onHandled = [this] { context_.lookForAnswers(); },
       .onUnsendable = [this](
                           const Carried& reply, const std::string& why,
                           wire::Item::Builder instead) { servers_.loseReply(reply, why, instead); },

@@ -74,6 +74,7 @@ kj::Promise<LineEnd> ClientRouter::runLine(kj::Own<kj::AsyncIoStream> stream) {
           .onPlain = [this](PlainItem& item) { servers_.handle(item); },
           .onRoom = [this] { servers_.pump(); },
           .onTraffic = [this] { context_.noteTraffic(); },
+          .onHandled = [this] { context_.lookForAnswers(); },
           .onUnsendable = [this](const Carried& request, const std::string& why,
                                  wire::Item::Builder) { servers_.refuse(request, why); },
       });

@@ -132,9 +132,15 @@ kj::Promise<void> Line::handleReceived(bool hasMore) {
     end(FarewellCode::STOPPING, error.what());
   }
   if (discardsInput()) return readAndDiscard();
-  if (isDone && !hasMore) return readLoop();
-  return whenAnswersAreSent().then(
-      [this, isDone, hasMore] { return isDone ? readLoop() : handleReceived(hasMore); });
+  // Of such tasks the newest one runs first: what is sent from here on is written before the next
+  // read.
+  auto next = isDone && !hasMore
+                  ? kj::evalLast([this] { return readLoop(); }).eagerlyEvaluate(nullptr)
+                  : whenAnswersAreSent().then([this, isDone, hasMore] {
+                      return isDone ? readLoop() : handleReceived(hasMore);
+                    });
+  if (std::exchange(hasHandled_, false) && events_.onHandled) events_.onHandled();
+  return next;
 }
 
 kj::Promise<void> Line::whenAnswersAreSent() {
@@ -179,6 +185,7 @@ bool Line::tryNextFrame() {
   keepAlive_.frameReceived(Clock::nowNs());
   count(record_->framesReceived);
   if (events_.onTraffic) events_.onTraffic();
+  hasHandled_ = true;
   items_ = frame->getRoot<wire::Frame>().getItems();
   nextItem_ = 0;
   plain_.reset();

@@ -64,6 +64,9 @@ class Line {
     // A frame has arrived, or frames are sent; not for each part of a long frame, because a router
     // that polls for these reads many small ones. May be empty.
     std::function<void()> onTraffic{};
+    // Items of one or more frames were handled, all that have arrived or those of one turn. May be
+    // empty.
+    std::function<void()> onHandled{};
     // A message cannot be sent. If it is a request, it has not been handled.
     SendQueue::OnUnsendable onUnsendable;
   };
@@ -144,6 +147,7 @@ class Line {
   FrameReader reader_;
   std::optional<capnp::List<wire::Item>::Reader> items_;  // of the frame that is being handled
   capnp::uint nextItem_ = 0;
+  bool hasHandled_ = false;  // a frame, since onHandled()
   std::optional<PlainFrame> plain_;  // the same frame
   PlainItem plainItem_;
   SendQueue queue_;

@@ -124,6 +124,45 @@ TEST_F(PollingTest, PollsAWindowUntilItSleepsAndOnceMore) {
   EXPECT_EQ(window.pollsSinceChange, 1) << "what arrived while nobody was woken";
 }
 
+TEST_F(PollingTest, LooksForAnswersAfterTheirSendersHaveRun) {
+  Window window;
+  int pollsAtYield = -1;
+  polling_.lookForAnswers();
+  EXPECT_EQ(window.polls, 0) << "it does not poll";
+  while (!window.isPolled) polling_.add(window);
+  const auto before = window.polls;
+
+  {
+    const std::function<void()> yield = [&] { pollsAtYield = window.polls; };
+    const ReplacedYield replaced(yield);
+    polling_.lookForAnswers();
+  }
+
+  EXPECT_EQ(pollsAtYield, before);
+  EXPECT_EQ(window.polls, before + 1);
+  while (polling_.isPolling()) wait();
+}
+
+TEST_F(PollingTest, EndsWhenOthersUseTheProcessorWhileItLooksForAnswers) {
+  Window window;
+  while (!window.isPolled) polling_.add(window);
+
+  {
+    const std::function<void()> yield = [] { othersRun(std::chrono::milliseconds(2)); };
+    const ReplacedYield replaced(yield);
+    polling_.lookForAnswers();
+  }
+  const auto polls = window.polls;
+  polling_.lookForAnswers();
+  EXPECT_EQ(window.polls, polls) << "it gives the processor up once";
+  while (polling_.isPolling()) wait();
+
+  polling_.add(window);
+  EXPECT_FALSE(polling_.isPolling()) << "nor does it poll for the next traffic";
+  while (!polling_.isPolling()) polling_.add(window);
+  while (polling_.isPolling()) wait();
+}
+
 TEST_F(PollingTest, PollsTheWindowsThatWereBusyLast) {
   std::array<Window, Polling::kMaxWindows + 1> windows;
   for (auto& window : windows) {

@@ -131,6 +131,7 @@ class LineTest : public testing::Test {
                 [this] {
                   if (onRoom_) onRoom_();
                 },
+            .onHandled = onHandled_,
             .onUnsendable =
                 [this](const Carried& carried, const std::string& why, wire::Item::Builder) {
                   said_.push_back("cannot send " + std::to_string(carried.requestId) + ": " + why);
@@ -157,6 +158,7 @@ class LineTest : public testing::Test {
   std::function<void(wire::Item::Reader)> onItem_;
   std::function<void(router::PlainItem&)> onPlain_;  // set it before start()
   std::function<void()> onRoom_;
+  std::function<void()> onHandled_;  // set it before start()
 
  private:
   kj::Promise<void> running_ = nullptr;

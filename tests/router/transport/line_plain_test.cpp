@@ -68,6 +68,22 @@ TEST_F(LinePlainTest, FramesMayArriveInAnyTwoParts) {
   }
 }
 
+TEST_F(LinePlainTest, ReportsOnceThatTheItemsThatArrivedWereHandled) {
+  int reports = 0;
+  onHandled_ = [&] { ++reports; };
+  startGreeted();
+  reports = 0;
+
+  const auto bytes = joined({plainFrame(1, 2), plainFrame(3, 1)});
+  send({bytes.begin(), bytes.begin() + 8});
+  EXPECT_EQ(reports, 0) << "a part of a frame";
+  send({bytes.begin() + 8, bytes.end()});
+
+  EXPECT_THAT(said_, ElementsAre("plain 1", "plain 2", "plain 3"));
+  EXPECT_EQ(reports, 1);
+  hangUp();
+}
+
 TEST_F(LinePlainTest, HandlesNothingOfAFrameThatEndsEarly) {
   startGreeted();
   auto bytes = joined({plainFrame(1, 2), plainFrame(3, 100)});
