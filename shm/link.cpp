@@ -240,7 +240,6 @@ LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> 
   if (body.size() <= layout::kInlineBodyBytes && trySendInSlots(envelope, body, waiting))
     return LinkSend::sent;
   if (!out_.hasFree(1 + reserve)) return LinkSend::full;
-
   auto own = pool_.tryFind(body.data());
   const auto foreign = own ? std::nullopt : borrowed_.tryFind(body.data());
   const bool inPlace = own || foreign;

@@ -30,8 +30,8 @@
 //          destroys a handle calls the lender of its body.
 // Throws   duplicate() and copyOf(), which allocate; all other public functions are noexcept.
 // Crash    <mpf/message_client.h> and <mpf/message_server.h> describe what the peer sees.
-// Trust    a peer may write anything to a body in shared memory, at any time. The length of an array
-//          is therefore that of its body, and not the one that the peer wrote into the body.
+// Trust    a peer may write anything to a body in shared memory, at any time. So the length of an
+//          array is that of its body, and not the number that the peer wrote there.
 // Source   manual, "Message", "Overview". Free lists, toBuffer() and fromBuffer() are not needed.
 #pragma once
 
