@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <kj/common.h>
+#include <utility>
 
 #include <mpf/clock.h>
 
@@ -53,9 +54,10 @@ void Polling::drop(Polled& window) {
   window.poll();
 }
 
-// The event loop first runs all tasks that are ready, and looks at its descriptors. Then it handles
-// what they have brought: tasks of evalLast() run in reverse order, so those that write to the
-// lines, which are newer, run before the next turn.
+// afterDelay(0): the event loop first runs all tasks that are ready and looks at its descriptors.
+// evalLast(): the turn runs after the handlers of what the descriptors have brought. Of the tasks
+// of evalLast() the newest one runs first: writes to the lines, which are newer, run before the
+// turn.
 kj::Promise<void> Polling::nextTurn() {
   return port_.getTimer().afterDelay(0 * kj::NANOSECONDS).then([this] {
     return kj::evalLast([this] { return loop(); });
@@ -65,6 +67,7 @@ kj::Promise<void> Polling::nextTurn() {
 kj::Promise<void> Polling::loop() {
   const auto nowNs = Clock::nowNs();
   ++idleTurns_;
+  hasLooked_ = false;
   if (nowNs - lastTrafficNs_ >= budget_.ns() || isCrowded_ || !tryYield(nowNs)) {
     end();
     return kj::READY_NOW;
@@ -74,9 +77,13 @@ kj::Promise<void> Polling::loop() {
 }
 
 void Polling::lookForAnswers() {
-  if (!isPolling_ || isCrowded_) return;
+  if (!isPolling_ || std::exchange(hasLooked_, true)) return;
   isCrowded_ = !tryYield(Clock::nowNs());
-  pollWindows();
+  // An error of a window does not concern the line that calls.
+  tasks_.add(kj::evalNow([this]() -> kj::Promise<void> {
+    pollWindows();
+    return kj::READY_NOW;
+  }));
 }
 
 void Polling::pollWindows() {
@@ -95,7 +102,7 @@ bool Polling::tryYield(std::int64_t nowNs) {
 // The last look at the windows may start to poll them again, or remove others.
 void Polling::end() {
   isPolling_ = false;
-  isCrowded_ = false;
+  hasLooked_ = isCrowded_ = false;
   for (auto left = windows_.size(); left != 0 && !windows_.empty(); --left) {
     auto& window = *windows_.front();
     windows_.erase(windows_.begin());

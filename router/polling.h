@@ -6,9 +6,9 @@
 //
 // While it polls, it looks at the descriptors of the event loop, and into the rings of the windows
 // that were busy lately: their clients and servers need no system call to hand a message over. It
-// gives up the processor in each turn: clients and servers on the same processor run first. If
-// others then use it for long, the router sleeps, and does not poll after the next bursts of
-// traffic (SharedProcessor).
+// gives up the processor in each turn and after each frame: clients and servers on the same
+// processor run first. If others then use it for long, the router sleeps, and does not poll after
+// the next bursts of traffic (SharedProcessor).
 //
 // Threads  that of the event loop.
 #pragma once
@@ -46,8 +46,9 @@ class Polling {
   void noteTraffic();
   // As noteTraffic(), and polls this window, too, as long as no kMaxWindows others are busier.
   void add(Polled& window);
-  // Messages were handed over: if it polls, lets their receivers run that share the processor, and
-  // looks for their answers.
+  // Call it after messages were handed over. While this object polls, it yields the processor, so
+  // that receivers on the same processor run, and looks at the windows, once in each turn. After a
+  // long yield the next turn ends the polling.
   void lookForAnswers();
   // The window is destroyed.
   void remove(Polled& window) noexcept;
@@ -67,6 +68,7 @@ class Polling {
   std::int64_t lastTrafficNs_ = 0;
   std::uint32_t idleTurns_ = 0;  // of the loop, since the last traffic
   bool isPolling_ = false;
+  bool hasLooked_ = false;  // for answers, in this turn
   bool isCrowded_ = false;  // others use the processor for long: the next turn ends the polling
   bool isReplacing_ = false;  // a window has its last look
   std::vector<Polled*> windows_;  // the one added last is at the end

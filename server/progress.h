@@ -18,7 +18,7 @@ class Progress {
   explicit Progress(layout::WindowControl& control) noexcept : control_(control) {}
 
   // Shows a request, until end(), as the one that the server handles.
-  //   cmd  the bytes of its body at layout::kCmdOffset
+  //   cmd  the bytes of its body at layout::kCmdOffset; ignored for types without a `cmd`
   void begin(MessageType type, std::int32_t cmd) noexcept;
   void end() noexcept;
   // Stores the time of the request that was taken last.

@@ -255,7 +255,7 @@ struct ChunkRef {
   std::uint32_t cmd = 0;
 };
 static_assert(sizeof(ChunkRef) == 20);
-// Where the bodies of types with a `cmd` have it.
+// Offset of the `cmd` in the body of every type that has one.
 inline constexpr std::size_t kCmdOffset = 4;
 
 // How the consumer of a ring looks for messages. With `polledUnfenced`, the producer needs no fence

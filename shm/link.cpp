@@ -324,7 +324,6 @@ void Link::afterFencedPush() noexcept {
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
   if (!peer_ || outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched) return;
-  untimedUntil_ = 0;  // the sampler chooses from now on
   // The receiver must wake up before the ring is full.
   const auto room = side_ == LinkSide::client ? header().queueSize : geometry_.replySlots;
   NoticeBatch::notify(peer_, peerIndex_, room / 2);
@@ -332,12 +331,11 @@ void Link::afterFencedPush() noexcept {
 
 // Of the messages to a peer that polls, one in kMaxInterval is timed; of others, those that the
 // sampler chooses.
-std::int64_t Link::timeIfDue() noexcept {
+std::int64_t Link::timeIfDue(bool isPolled) noexcept {
   constexpr auto kInterval = TimeSampler::kMaxInterval;
   const auto sent = out_.messages();
-  const bool isPolled = outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched;
   if (!(isPolled ? sent % kInterval == 0 : sampler_.isDue(sent))) {
-    if (isPolled) untimedUntil_ = (sent / kInterval + 1) * kInterval;
+    untimedUntil_ = (sent / kInterval + 1) * kInterval;
     return 0;
   }
   const auto nowNs = Clock::nowNs();

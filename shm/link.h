@@ -196,7 +196,8 @@ class Link {
   // The time now if the next message is to be timed (Envelope::sentTick), otherwise 0. For each
   // attempt to send.
   [[nodiscard]] std::int64_t timeOfNext() noexcept {
-    return out_.messages() < untimedUntil_ ? 0 : timeIfDue();
+    const bool isPolled = outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched;
+    return isPolled && out_.messages() < untimedUntil_ ? 0 : timeIfDue(isPolled);
   }
   // The ring that trySend() fills; it counts the messages that were sent, and those that the peer
   // has taken.
@@ -268,7 +269,7 @@ class Link {
       afterFencedPush();
   }
   void afterFencedPush() noexcept;
-  std::int64_t timeIfDue() noexcept;
+  std::int64_t timeIfDue(bool isPolled) noexcept;
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
 
   ForkGuard forkGuard_;
@@ -286,7 +287,7 @@ class Link {
   bool isInBatch_ = false;  // the end of the batch notifies the peer
   RingProducer out_;
   TimeSampler sampler_;  // of outgoing messages
-  std::uint64_t untimedUntil_ = 0;  // no message is timed before this number
+  std::uint64_t untimedUntil_ = 0;  // no message to a peer that polls is timed before this number
   RingConsumer in_;
   PoolOwner pool_;
   bool leavesPool_ = false;

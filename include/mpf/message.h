@@ -30,8 +30,8 @@
 //          destroys a handle calls the lender of its body.
 // Throws   duplicate() and copyOf(), which allocate; all other public functions are noexcept.
 // Crash    <mpf/message_client.h> and <mpf/message_server.h> describe what the peer sees.
-// Trust    a peer may write anything to a body in shared memory, at any time. So the length of an
-//          array is that of its body, and not the number that the peer wrote there.
+// Trust    a peer may write anything to a body in shared memory, at any time. The number of
+//          elements of an array follows from the size of its body; `length` is never read.
 // Source   manual, "Message", "Overview". Free lists, toBuffer() and fromBuffer() are not needed.
 #pragma once
 
@@ -142,9 +142,8 @@ class Message {
   [[nodiscard]] std::span<const std::byte> body() const noexcept { return {data(), size()}; }
 
   // Copies type, clientType, clientExtra, time stamp, route and body; a large body is copied to the
-  // heap. Only the original reports to the
-  // RouteKeeper: a request is not refused when only its copy is destroyed. A server may reply with
-  // the copy.
+  // heap. Only the original reports to the RouteKeeper: a request is not refused when only its copy
+  // is destroyed. A server may reply with the copy.
   //   throws  std::bad_alloc
   [[nodiscard]] Message duplicate() const;
 
@@ -346,7 +345,7 @@ class Message {
     state_.timeStampNs = attributes.timeStampNs;
   }
   // Sets `sound`, and `length` of a valid array, from the size of the body. Does not read the body:
-  // its first line may be with the processor that has written it.
+  // its first line may be in the cache of the processor that wrote it.
   void check() noexcept {
     const auto& layout = layoutOf(state_.type);
     const auto bytes = size();

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -38,6 +39,7 @@ constexpr BodyLayout layoutOf() {
                 "a struct with padding sends uninitialised bytes to a peer");
   if constexpr (ArrayBody<T>) {
     static_assert(sizeof(T) % 8 == 0, "elements are aligned to 8 bytes");
+    static_assert(std::has_single_bit(sizeof(typename T::Element)), "lengths come from a shift");
     return {sizeof(T), sizeof(typename T::Element), offsetof(T, length), T::kName};
   } else {
     return {sizeof(T), 0, 0, T::kName};

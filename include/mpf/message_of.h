@@ -21,7 +21,7 @@
 //
 // Threads  as Message: one thread at a time uses a handle.
 // Throws   allocValue(), bytesFor(), inBuffer(), setLength() and setSize(); no other function.
-// Trust    as Message: the length of an array is that of its body.
+// Trust    as Message: the length of an array follows from the size of its body.
 // Source   manual, "Char8ArrayMessage", "Int32ArrayMessage", "Float64ArrayMessage". freeValue() has
 //          no counterpart: the destructor of the handle frees the elements.
 #pragma once

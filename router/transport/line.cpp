@@ -82,7 +82,7 @@ void Line::finish(LineEnd end) {
 kj::Promise<void> Line::readLoop() {
   auto room = reader_.room();
   return stream_->tryRead(room.begin(), 1, room.size())
-      .then([this, most = room.size()](std::size_t bytes) -> kj::Promise<void> {
+      .then([this](std::size_t bytes) -> kj::Promise<void> {
         if (bytes == 0) {
           finish({farewell_.empty() ? closedReason() : farewell_});
           return kj::READY_NOW;
@@ -91,7 +91,7 @@ kj::Promise<void> Line::readLoop() {
         count(record_->bytesReceived, bytes);
         keepAlive_.bytesReceived(bytes);
         reader_.filled(bytes);
-        return handleReceived(bytes == most);
+        return handleReceived();
       });
 }
 
@@ -116,8 +116,7 @@ kj::Promise<void> Line::readAndDiscard() {
 
 // Handles the received items, in turns of at most kTurnNs. Continues with the next turn when the
 // peer has read enough of the answers.
-//   hasMore  the last read filled its buffer: more bytes may be waiting
-kj::Promise<void> Line::handleReceived(bool hasMore) {
+kj::Promise<void> Line::handleReceived() {
   if (discardsInput()) return readAndDiscard();
   bool isDone = false;
   try {
@@ -132,19 +131,13 @@ kj::Promise<void> Line::handleReceived(bool hasMore) {
     end(FarewellCode::STOPPING, error.what());
   }
   if (discardsInput()) return readAndDiscard();
-  // Of such tasks the newest one runs first: what is sent from here on is written before the next
-  // read.
-  auto next = isDone && !hasMore
-                  ? kj::evalLast([this] { return readLoop(); }).eagerlyEvaluate(nullptr)
-                  : whenAnswersAreSent().then([this, isDone, hasMore] {
-                      return isDone ? readLoop() : handleReceived(hasMore);
-                    });
   if (std::exchange(hasHandled_, false) && events_.onHandled) events_.onHandled();
-  return next;
+  return whenAnswersAreSent().then(
+      [this, isDone] { return isDone ? readLoop() : handleReceived(); });
 }
 
 kj::Promise<void> Line::whenAnswersAreSent() {
-  // Let the other tasks of the event loop run.
+  // Let the other tasks of the event loop run, first of all the one that writes the answers.
   if (!queue_.hasMaxAnswers()) return timer_.afterDelay(0 * kj::NANOSECONDS);
   auto paf = kj::newPromiseAndFulfiller<void>();
   resumeReading_ = kj::mv(paf.fulfiller);
@@ -166,6 +159,7 @@ bool Line::handleSome() {
       items_.reset();
       continue;
     }
+    hasHandled_ = true;
     const auto at = nextItem_++;
     if (!tryHandlePlain(at, notices)) {
       notices.give();  // this item may take long
@@ -185,7 +179,6 @@ bool Line::tryNextFrame() {
   keepAlive_.frameReceived(Clock::nowNs());
   count(record_->framesReceived);
   if (events_.onTraffic) events_.onTraffic();
-  hasHandled_ = true;
   items_ = frame->getRoot<wire::Frame>().getItems();
   nextItem_ = 0;
   plain_.reset();

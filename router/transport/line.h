@@ -64,8 +64,7 @@ class Line {
     // A frame has arrived, or frames are sent; not for each part of a long frame, because a router
     // that polls for these reads many small ones. May be empty.
     std::function<void()> onTraffic{};
-    // Items of one or more frames were handled, all that have arrived or those of one turn. May be
-    // empty.
+    // Items were handled: all that have arrived, or those of one turn. May be empty.
     std::function<void()> onHandled{};
     // A message cannot be sent. If it is a request, it has not been handled.
     SendQueue::OnUnsendable onUnsendable;
@@ -119,7 +118,7 @@ class Line {
 
   kj::Promise<void> readLoop();
   kj::Promise<void> readAndDiscard();
-  kj::Promise<void> handleReceived(bool hasMore);
+  kj::Promise<void> handleReceived();
   kj::Promise<void> whenAnswersAreSent();
   bool handleSome();
   bool tryNextFrame();
@@ -147,9 +146,9 @@ class Line {
   FrameReader reader_;
   std::optional<capnp::List<wire::Item>::Reader> items_;  // of the frame that is being handled
   capnp::uint nextItem_ = 0;
-  bool hasHandled_ = false;  // a frame, since onHandled()
   std::optional<PlainFrame> plain_;  // the same frame
   PlainItem plainItem_;
+  bool hasHandled_ = false;  // an item, since the last onHandled()
   SendQueue queue_;
   // Notes that are sent while items of the peer are handled are answers.
   SendQueue::NoteKind noteKind_ = SendQueue::NoteKind::own;

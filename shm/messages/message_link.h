@@ -55,7 +55,8 @@ class MessageLink final : public BodyLender {
     ring.endOneSlot();
     return message;
   }
-  // Of the message begun, whose body is not isShort(): the bytes at layout::kCmdOffset of its body.
+  // Returns the bytes at layout::kCmdOffset of the body of the message begun, which is not
+  // isShort(), without a look at its chunk.
   [[nodiscard]] std::int32_t cmdOfLong(BodyFields body) const noexcept;
   // `invalid`: the body is invalid. `unavailable`: the body cannot be mapped, because its owner
   // has ended or memory is short; the message is lost, but the link is sound.

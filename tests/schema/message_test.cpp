@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <gmock/gmock.h>
 #include <random>
@@ -235,6 +238,29 @@ TEST(Message, TakesTheLengthOfAnArrayFromItsBodyWhateverThePeerWrites) {
   ASSERT_TRUE(copy.isSound());
   EXPECT_EQ(copy.valueAs<Int32Array>().size(), 5U);
   EXPECT_EQ(copy.tryAs<Int32Array>()->length, 5U) << "a copy has the length in its body, too";
+}
+
+// The first line of a body may be in the cache of another processor.
+TEST(Message, DoesNotReadTheBodyToKnowItsLength) {
+  Pool pool;
+  const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  auto* const unreadable = ::mmap(nullptr, page, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(unreadable, MAP_FAILED);
+
+  const auto message = Message::adopt(
+      MessageType::float64Array, {static_cast<std::byte*>(unreadable), 24 + 5 * 8, page, &pool});
+
+  EXPECT_EQ(message.arrayLength(), 5U);
+  ::munmap(unreadable, page);
+}
+
+TEST(Message, TakesTheLengthOfABodyInTheHandleFromItsSize) {
+  Pool pool;
+  pool.write(Int32Array{.length = 1});
+  const std::span<const std::byte> bytes = pool.memory;
+
+  EXPECT_EQ(Message::copyInline(MessageType::int32Array, bytes.first(32)).arrayLength(), 2U);
+  EXPECT_FALSE(Message::copyInline(MessageType::int32Array, bytes.first(31)).isSound());
 }
 
 TEST(Message, RefusesABodyThatEndsWithinAnElement) {

@@ -29,7 +29,7 @@ def value(message):
     if message.type == FLOAT64:
         return struct.unpack_from("=d", message.body, 24)[0]
     if message.type == FLOAT64_ARRAY:
-        return struct.unpack_from(f"={struct.unpack_from('=I', message.body, 20)[0]}d", message.body, 24)
+        return struct.unpack_from(f"={(len(message.body) - 24) // 8}d", message.body, 24)
     if message.type == REQUEST_FATE:
         return struct.unpack_from("=iI", message.body, 0)
     return message.body

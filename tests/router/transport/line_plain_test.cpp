@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Line: plain items, between others, in parts, and at the end of a connection.
+#include <malloc.h>
+
 #include "tests/router/transport/line_fixture.h"
 #include "tests/shm/receiver.h"
 #include "tests/support/test_backplane.h"
@@ -14,6 +16,34 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // kj::Own destroys the dynamic type
+// Records the order of reads and writes.
+class Recording final : public kj::AsyncIoStream {
+ public:
+  Recording(kj::Own<kj::AsyncIoStream> stream, std::vector<std::string>& calls)
+      : stream_(kj::mv(stream)), calls_(calls) {}
+  kj::Promise<std::size_t> tryRead(void* buffer, std::size_t least, std::size_t most) override {
+    calls_.emplace_back("read");
+    return stream_->tryRead(buffer, least, most);
+  }
+  kj::Promise<void> write(const void* buffer, std::size_t size) override {
+    calls_.emplace_back("write");
+    return stream_->write(buffer, size);
+  }
+  kj::Promise<void> write(kj::ArrayPtr<const kj::ArrayPtr<const kj::byte>> pieces) override {
+    calls_.emplace_back("write");
+    return stream_->write(pieces);
+  }
+  kj::Promise<void> whenWriteDisconnected() override { return stream_->whenWriteDisconnected(); }
+  void shutdownWrite() override { stream_->shutdownWrite(); }
+
+ private:
+  kj::Own<kj::AsyncIoStream> stream_;
+  std::vector<std::string>& calls_;
+};
+#pragma GCC diagnostic pop
 
 class LinePlainTest : public LineTest {
  protected:
@@ -82,6 +112,40 @@ TEST_F(LinePlainTest, ReportsOnceThatTheItemsThatArrivedWereHandled) {
   EXPECT_THAT(said_, ElementsAre("plain 1", "plain 2", "plain 3"));
   EXPECT_EQ(reports, 1);
   hangUp();
+}
+
+// A read that finds nothing would delay the answer.
+TEST_F(LinePlainTest, WritesTheAnswersBeforeItReadsAgain) {
+  std::vector<std::string> calls;
+  pipe_.ends[0] = kj::heap<Recording>(kj::mv(pipe_.ends[0]), calls);
+  onPlain_ = [this](const PlainItem& item) { line_->send(plain(item.requestId)); };
+  startGreeted();
+  calls.clear();
+
+  for (std::uint32_t id = 1; id <= 2; ++id) {
+    send(plainFrame(id, 1));
+    EXPECT_THAT(receive(), ElementsAre(HasSubstr("requestId = " + std::to_string(id))));
+  }
+
+  EXPECT_THAT(calls, ElementsAre("write", "read", "write", "read"));
+  hangUp();
+}
+
+TEST_F(LinePlainTest, KeepsNoMemoryOfFramesThatWereHandled) {
+  constexpr std::uint32_t kFrames = 5000;
+  startGreeted();
+  const auto handle = [this] {
+    for (std::uint32_t id = 1; id <= kFrames; ++id) {
+      send(plainFrame(id, 1));
+      said_.clear();
+    }
+    return ::mallinfo2().uordblks;
+  };
+
+  const auto before = handle();
+  const auto after = handle();
+
+  EXPECT_LT(after, before + kFrames * sizeof(void*));
 }
 
 TEST_F(LinePlainTest, HandlesNothingOfAFrameThatEndsEarly) {

@@ -130,6 +130,26 @@ TEST_F(ReportTest, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
   EXPECT_EQ(now.at("clients").at(0).at("state"), "stalled") << "it receives no replies";
 }
 
+// One slot, several slots, a chunk.
+TEST_F(ReportTest, TheCmdOfARequestIsShownWhateverItsSize) {
+  openServer("dmm");
+  connect();
+  auto small = Int32Message({.cmd = 1});
+  auto medium = client_->alloc<Char8Array>(1);
+  auto large = client_->alloc<Char8Array>(1000);
+  medium->cmd = 2;
+  large->cmd = 3;
+  int cmd = 0;
+  for (Message* const question : {static_cast<Message*>(&small), static_cast<Message*>(&medium),
+                                  static_cast<Message*>(&large)}) {
+    ASSERT_EQ(client_->send(std::move(*question)), SendResult::sent);
+    Message inWork;
+    while (!inWork) inWork = server_->receive();
+
+    EXPECT_EQ(ls().at("servers").at(0).at("handling").at("cmd"), ++cmd);
+  }
+}
+
 // A server whose only thread works on a request accepts no client and receives nothing: reports and
 // clients show why.
 TEST_F(ReportTest, ABusyServerIsShownWithItsRequestAndTheTime) {
