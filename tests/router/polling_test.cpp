@@ -8,6 +8,9 @@
 #include <kj/async-io.h>
 #include <memory>
 #include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/replaced_yield.h"
@@ -161,6 +164,50 @@ TEST_F(PollingTest, EndsWhenOthersUseTheProcessorWhileItLooksForAnswers) {
   EXPECT_FALSE(polling_.isPolling()) << "nor does it poll for the next traffic";
   while (!polling_.isPolling()) polling_.add(window);
   while (polling_.isPolling()) wait();
+}
+
+TEST_F(PollingTest, AnErrorOfAWindowEndsTheRouterNotTheLineThatLooksForAnswers) {
+  struct Faulty final : router::Polled {
+    void poll() override {
+      if (std::exchange(isFaulty, false)) throw std::runtime_error("no memory");
+    }
+    void setPolled(bool polled) override { isPolled = polled; }
+    bool isFaulty = false;
+    bool isPolled = false;
+  };
+  Faulty window;
+  while (!window.isPolled) polling_.add(window);
+  window.isFaulty = true;
+
+  EXPECT_NO_THROW(polling_.lookForAnswers());
+
+  EXPECT_FALSE(window.isFaulty) << "the window was polled";
+  EXPECT_THROW(wait(), kj::Exception);
+  while (polling_.isPolling()) wait();
+}
+
+// A turn must find what the handlers of the line have put into the rings.
+TEST_F(PollingTest, HandlesWhatTheDescriptorsBroughtBeforeItPolls) {
+  struct Noting final : router::Polled {
+    explicit Noting(std::vector<std::string>& to) : calls(to) {}
+    void poll() override { calls.emplace_back("poll"); }
+    void setPolled(bool polled) override { isPolled = polled; }
+    std::vector<std::string>& calls;
+    bool isPolled = false;
+  };
+  std::vector<std::string> calls;
+  auto pipe = io_.provider->newTwoWayPipe();
+  char byte = 0;
+  auto read = pipe.ends[1]->read(&byte, 1).then([&] { calls.emplace_back("handle"); });
+  auto handled = read.eagerlyEvaluate(nullptr);
+  Noting window(calls);
+  while (!window.isPolled) polling_.add(window);
+
+  pipe.ends[0]->write("x", 1).wait(io_.waitScope);
+  while (polling_.isPolling()) wait();
+
+  ASSERT_FALSE(calls.empty());
+  EXPECT_EQ(calls.front(), "handle");
 }
 
 TEST_F(PollingTest, PollsTheWindowsThatWereBusyLast) {
