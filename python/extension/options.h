@@ -2,6 +2,7 @@
 // Arguments of Python as values of C++, and the number of forks of this process.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include <mpf/clock.h>
@@ -13,6 +14,9 @@ namespace mpf::python {
 [[nodiscard]] Deadline deadlineOf(double seconds);
 // "spin", "adaptive" or "block". Throws std::invalid_argument for other words.
 [[nodiscard]] WaitMode waitModeOf(const std::string& word);
+
+// A wait looks for signals at this interval: a signal handler of Python runs at most this late.
+inline constexpr std::chrono::milliseconds kLookForSignals{100};
 
 // Differs between a process and the children that it forks.
 [[nodiscard]] int forkCount() noexcept;

@@ -5,13 +5,9 @@
 #include <chrono>
 #include <utility>
 
+#include "python/extension/options.h"
+
 namespace mpf::python {
-namespace {
-
-// A signal handler of Python runs at most this late.
-constexpr auto kLook = std::chrono::milliseconds(100);
-
-}  // namespace
 
 Requester::Requester(const Backplane& backplane, const std::string& server, std::int32_t location,
                      WaitMode waitMode)
@@ -92,7 +88,7 @@ void Requester::runDispatcher(std::unique_lock<std::mutex>& lock, Deadline deadl
 
 template <class Done>
 bool Requester::wait(const Done& isDone, Deadline deadline, const IsInterrupted& isInterrupted) {
-  auto look = Deadline::after(kLook);
+  auto look = Deadline::after(kLookForSignals);
   std::unique_lock lock(mutex_);
   while (!isDone()) {
     if (isClosed_ || deadline.hasPassed()) return false;
@@ -100,7 +96,7 @@ bool Requester::wait(const Done& isDone, Deadline deadline, const IsInterrupted&
       lock.unlock();
       if (isInterrupted()) return false;
       lock.lock();
-      look = Deadline::after(kLook);
+      look = Deadline::after(kLookForSignals);
       continue;  // it may be done now
     }
     const auto end = std::min(deadline, look);

@@ -24,8 +24,6 @@ namespace {
 using nb::literals::operator""_a;
 
 constexpr const char* kServer = "server";
-// A signal handler of Python runs at most this late.
-constexpr auto kLook = std::chrono::milliseconds(100);
 
 class PyServer {
  public:
@@ -167,7 +165,7 @@ class PyServer {
   Message waitUnlocked(MessageServer& server, Deadline deadline,
                        const std::function<bool()>& hasSignal) {
     while (!deadline.hasPassed() && !isInterrupted_) {
-      const auto look = Deadline::after(kLook);
+      const auto look = Deadline::after(kLookForSignals);
       if (server.waitForMessage(std::min(deadline, look))) {
         if (auto request = server.receive()) return request;
       }
