@@ -72,7 +72,7 @@ bool Binding::tryTakeLong(BodyFields fields, RequestMarks marks, Times times, Re
   const Route route{0, marks.requestId, request != nullptr ? kEndsRequest : 0, nullptr};
   MessageLink::Finish finish{};
   auto message = channel().finishLong(
-      fields, {route, marks.clientType, marks.clientExtra, times.timeNs}, finish);
+      fields, {route, marks.clientType(), marks.clientExtra(), times.timeNs}, finish);
   switch (finish) {
     case MessageLink::Finish::invalid:
       return false;

@@ -114,8 +114,8 @@ ReplyResult ReplySender::noteRefused(LinkSend result) noexcept {
 
 void ReplySender::sendFate(Connection& connection, RequestMarks request, Fate fate) noexcept {
   RequestFateMessage message({.fate = fate, .requestId = request.requestId});
-  message.setClientType(request.clientType);
-  message.setClientExtra(request.clientExtra);
+  message.setClientType(request.clientType());
+  message.setClientExtra(request.clientExtra());
   message.setRoute(connection.routeOf(request.requestId, nullptr));
   static_cast<void>(send(message));
 }

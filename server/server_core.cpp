@@ -155,7 +155,7 @@ Message ServerCore::finishLong(Connection& connection, BodyFields fields, Reques
   MessageLink::Finish finish{};
   auto message = connection.channel->finishLong(
       fields,
-      {connection.routeOf(marks.requestId, &keeper_), marks.clientType, marks.clientExtra, 0},
+      {connection.routeOf(marks.requestId, &keeper_), marks.clientType(), marks.clientExtra(), 0},
       finish);
   switch (finish) {
     case MessageLink::Finish::invalid:

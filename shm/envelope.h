@@ -10,6 +10,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include <mpf/detail/copy_words.h>
+
 #include "shm/layout.h"
 
 namespace mpf {
@@ -37,12 +39,18 @@ struct BodyFields {
   std::uint32_t bodyBytes{};
 };
 
-// The part of an envelope that a reply copies from its request. The marks of the client come first:
-// they share a register, and are stored in a message together.
+// The part of an envelope that a reply copies from its request. Two numbers of 32 bits would go
+// through memory on their way into one register, so they are joined.
 struct RequestMarks {
-  std::int32_t clientType{};
-  std::int32_t clientExtra{};
+  std::uint64_t ofClient{};
   std::uint32_t requestId{};
+
+  [[nodiscard]] std::int32_t clientType() const noexcept {
+    return static_cast<std::int32_t>(ofClient);
+  }
+  [[nodiscard]] std::int32_t clientExtra() const noexcept {
+    return static_cast<std::int32_t>(ofClient >> 32);
+  }
 };
 
 // The fields that are sent with a body. The ring does not interpret `type`, `clientType` or
@@ -58,7 +66,11 @@ struct Envelope {
   std::int64_t timeNs{};  // requests: the deadline; replies: the time stamp; 0: none
 
   [[nodiscard]] BodyFields body() const noexcept { return {type, flags, bodyBytes}; }
-  [[nodiscard]] RequestMarks marks() const noexcept { return {clientType, clientExtra, requestId}; }
+  [[nodiscard]] RequestMarks marks() const noexcept {
+    const auto low = detail::widened(static_cast<std::uint32_t>(clientType));
+    const auto high = detail::widened(static_cast<std::uint32_t>(clientExtra));
+    return {low | high << 32, requestId};
+  }
 };
 
 // A copy of the body bytes in a first slot, in words that the compiler keeps in registers.

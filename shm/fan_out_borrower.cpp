@@ -9,16 +9,16 @@
 
 namespace mpf {
 
-std::optional<Chunk> FanOutBorrower::tryBorrow(const layout::ChunkRef& ref) try {
-  if (ref.side != layout::kFanOutSide || ref.segment >= layout::kReturnsFanOut || ref.chunk != 0)
-    return std::nullopt;
+std::optional<Chunk> FanOutBorrower::tryBorrow(ChunkPlace place, std::uint32_t missed) try {
+  const auto number = place.segment;
+  if (number >= layout::kReturnsFanOut || place.chunk != 0) return std::nullopt;
   const auto free = std::ranges::find_if(
-      views_, [&](const View& view) { return view.number == ref.segment && !view.isHeld; });
-  auto* const view = free != views_.end() ? &*free : tryMap(ref.segment);
+      views_, [&](const View& view) { return view.number == number && !view.isHeld; });
+  auto* const view = free != views_.end() ? &*free : tryMap(number);
   if (view == nullptr || view->segment.isLost()) return std::nullopt;
   view->isHeld = true;
   return Chunk{view->segment.data() + layout::kBulkChunksOffset,
-               view->segment.bytes() - layout::kBulkChunksOffset, ref};
+               view->segment.bytes() - layout::kBulkChunksOffset, true, missed};
 } catch (const SegmentError&) {
   return std::nullopt;
 }
@@ -46,13 +46,13 @@ void FanOutBorrower::unmapUnused() noexcept {
     std::erase_if(views_, [](const View& view) { return !view.isHeld; });
 }
 
-std::optional<layout::ChunkRef> FanOutBorrower::tryRelease(const std::byte* data) noexcept {
+std::optional<std::uint32_t> FanOutBorrower::tryRelease(const std::byte* data) noexcept {
   const auto held = std::ranges::find_if(views_, [data](const View& view) {
     return view.isHeld && data == view.segment.data() + layout::kBulkChunksOffset;
   });
   if (held == views_.end()) return std::nullopt;
   held->isHeld = false;
-  return layout::ChunkRef{held->number, 0, layout::kFanOutSide, 0};
+  return held->number;
 }
 
 }  // namespace mpf

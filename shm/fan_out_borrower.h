@@ -29,12 +29,13 @@ class FanOutBorrower {
   FanOutBorrower(std::string_view backplane, std::uint64_t serverWindow)
       : backplane_(backplane), serverWindow_(serverWindow) {}
 
-  // Maps a chunk that the server sent; nullopt if there is no such chunk.
+  // Maps a chunk that the server sent; nullopt if there is no such chunk. `missed`: as in the
+  // reference to it.
   //   throws  std::system_error, std::bad_alloc: no free descriptor or no memory to map it
-  std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
-  // Ends the use of a chunk; nullopt if `data` is not the start of one that is held. The caller
-  // returns the reference to the server.
-  std::optional<layout::ChunkRef> tryRelease(const std::byte* data) noexcept;
+  std::optional<Chunk> tryBorrow(ChunkPlace place, std::uint32_t missed);
+  // Ends the use of a chunk and returns its number, which the caller returns to the server; nullopt
+  // if `data` is not the start of one that is held.
+  std::optional<std::uint32_t> tryRelease(const std::byte* data) noexcept;
 
  private:
   struct View {

@@ -235,6 +235,28 @@ void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
 }
 
+// Inline, and field by field, because a copy of the envelope would wait for the stores to it.
+[[gnu::always_inline]] inline bool Link::trySendRef(const Envelope& envelope, std::size_t bodyBytes,
+                                                    const layout::ChunkRef& ref,
+                                                    std::uint32_t reserve) noexcept {
+  const auto marked = [&] {
+    return Envelope{.type = envelope.type,
+                    .flags = static_cast<std::uint8_t>(envelope.flags | layout::kSlotChunk),
+                    .requestId = envelope.requestId,
+                    .clientType = envelope.clientType,
+                    .clientExtra = envelope.clientExtra,
+                    .sentTick = envelope.sentTick,
+                    .timeNs = envelope.timeNs};
+  };
+  // As long as a slot has room for: the ring copies such a body in words.
+  const std::array<std::uint32_t, layout::kFirstSlotBodyBytes / 4> body{
+      ref.segment, ref.chunk, ref.side, ref.missed, ref.cmd};
+  const auto bytes = static_cast<std::uint32_t>(bodyBytes);
+  if (!out_.tryPushShort(marked, bytes, std::as_bytes(std::span(body)), reserve)) return false;
+  afterPush();
+  return true;
+}
+
 LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> body,
                            std::uint32_t waiting, std::uint32_t reserve) noexcept {
   if (body.size() <= layout::kInlineBodyBytes && trySendInSlots(envelope, body, waiting))
@@ -248,15 +270,17 @@ LinkSend Link::trySendLong(const Envelope& envelope, std::span<const std::byte> 
     if (!chunk) return LinkSend::noMemory;
     std::memcpy(chunk->data, body.data(), body.size());
     MPF_STEP(chunk_filled);
-    own = chunk->ref;
+    own = pool_.tryFind(chunk->data);
   }
   if (own) pool_.lend(*own);
   MPF_STEP(chunk_lent);
-  auto ref = own ? *own : *foreign;
-  if (side_ == LinkSide::client)
-    std::memcpy(&ref.cmd, body.data() + layout::kCmdOffset, sizeof ref.cmd);
+  const auto place = own ? *own : *foreign;
+  const auto side = own ? static_cast<std::uint32_t>(side_) : peerSide();
+  std::uint32_t cmd = 0;
+  if (side_ == LinkSide::client) std::memcpy(&cmd, body.data() + layout::kCmdOffset, sizeof cmd);
   // hasFree() above has checked that it fits.
-  if (!trySendRef(envelope, body.size(), ref, reserve)) return LinkSend::full;
+  if (!trySendRef(envelope, body.size(), {place.segment, place.chunk, side, 0, cmd}, reserve))
+    return LinkSend::full;
   return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }
 
@@ -270,20 +294,6 @@ bool Link::trySendInSlots(const Envelope& envelope, std::span<const std::byte> b
   auto sized = envelope;
   sized.bodyBytes = static_cast<std::uint32_t>(body.size());
   if (!out_.tryPush(sized, body, needed)) return false;
-  afterPush();
-  return true;
-}
-
-bool Link::trySendRef(const Envelope& envelope, std::size_t bodyBytes, const layout::ChunkRef& ref,
-                      std::uint32_t reserve) noexcept {
-  auto marked = envelope;
-  marked.flags |= layout::kSlotChunk;
-  // As long as a slot has room for: the ring copies such a body in words.
-  const std::array<std::uint32_t, layout::kFirstSlotBodyBytes / 4> body{
-      ref.segment, ref.chunk, ref.side, ref.missed, ref.cmd};
-  const auto bytes = static_cast<std::uint32_t>(bodyBytes);
-  if (!out_.tryPushShort([&] { return marked; }, bytes, std::as_bytes(std::span(body)), reserve))
-    return false;
   afterPush();
   return true;
 }
@@ -349,30 +359,22 @@ void Link::release(const std::byte* data) noexcept {
   } else if (const auto foreign = borrowed_.tryFind(data)) {
     borrowed_.giveBack(*foreign);
   } else if (const auto shared = fanOut_.tryRelease(data)) {
-    borrowed_.giveBack(*shared);
+    borrowed_.giveBackFanOut(*shared);
   }
 }
 
-std::optional<Chunk> Link::tryChunk(std::uint32_t bodyBytes) {
-  std::array<std::byte, layout::kFirstSlotBodyBytes> body;
-  in_.firstBody().copyTo(body.data());
-  layout::ChunkRef ref{};
-  std::memcpy(&ref, body.data(), sizeof ref);
-  const bool isOurs = ref.side == static_cast<std::uint32_t>(side_);
-  auto chunk = isOurs ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
-  if (!chunk && !isOurs && hasPeerEnded()) {
-    borrowed_.giveBack(ref);
-    throw ChunkUnavailable();
+std::optional<Chunk> Link::tryBorrowOther(layout::ChunkRef ref) try {
+  std::optional<Chunk> chunk;
+  if (ref.side == layout::kFanOutSide && side_ == LinkSide::client) {
+    chunk = fanOut_.tryBorrow({ref.segment, ref.chunk}, ref.missed);
+  } else if (ref.side == peerSide()) {
+    chunk = borrowed_.tryBorrow({ref.segment, ref.chunk});
   }
-  if (chunk && bodyBytes > chunk->capacity) chunk.reset();
+  if (!chunk && hasPeerEnded()) throw ChunkUnavailable();
   return chunk;
-}
-
-std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) try {
-  return ref.side == layout::kFanOutSide && side_ == LinkSide::client ? fanOut_.tryBorrow(ref)
-                                                                      : borrowed_.tryBorrow(ref);
-} catch (const std::exception&) {  // no descriptor or no memory
-  borrowed_.giveBack(ref);
+} catch (const std::exception&) {  // also: no descriptor or no memory
+  if (ref.side == layout::kFanOutSide) borrowed_.giveBackFanOut(ref.segment);
+  else borrowed_.giveBack({ref.segment, ref.chunk});
   throw ChunkUnavailable();
 }
 

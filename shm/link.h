@@ -227,7 +227,13 @@ class Link {
   // The chunk of the kSlotChunk message begun, whose number of slots is valid: borrowed from the
   // peer, or one of ours that the peer returns in a message. nullopt if the reference is invalid.
   //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
-  std::optional<Chunk> tryChunk(std::uint32_t bodyBytes);
+  [[gnu::always_inline]] std::optional<Chunk> tryChunk(std::uint32_t bodyBytes) {
+    const auto ref = in_.chunkRef();
+    const bool isOurs = ref.side == static_cast<std::uint32_t>(side_);
+    auto chunk = isOurs ? pool_.tryReceiveBack({ref.segment, ref.chunk}) : tryBorrow(ref);
+    if (chunk && bodyBytes > chunk->capacity) chunk.reset();
+    return chunk;
+  }
 
   // Announces that we poll this link: the peer need not set our ready bit. `pollsInWaits`: also
   // while we wait; then the peer is told on which processor.
@@ -270,7 +276,19 @@ class Link {
   }
   void afterFencedPush() noexcept;
   std::int64_t timeIfDue(bool isPolled) noexcept;
-  std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
+  [[gnu::always_inline]] std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref) {
+    if (ref.side == peerSide()) {
+      if (const auto chunk = borrowed_.tryBorrowMapped({ref.segment, ref.chunk})) [[likely]]
+        return chunk;
+    }
+    return tryBorrowOther(ref);
+  }
+  // Of a chunk that is not mapped yet, is in the fan-out pool, or does not exist. A copy, so that
+  // the caller has its own in registers.
+  std::optional<Chunk> tryBorrowOther(layout::ChunkRef ref);
+  [[nodiscard]] std::uint32_t peerSide() const noexcept {
+    return 1 - static_cast<std::uint32_t>(side_);
+  }
 
   ForkGuard forkGuard_;
   Segment segment_;

@@ -54,7 +54,7 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
       bulk.states[index] = ChunkState::held;
       ++inUse_;
       MPF_STEP(chunk_claimed);
-      return Chunk{bulk.chunk(index), chunkBytes, {segment, index, place_.side, 0}};
+      return Chunk{bulk.chunk(index), chunkBytes};
     }
     if (!addBulk(chunkBytes)) break;
   }
@@ -89,31 +89,6 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
   return false;  // /dev/shm is full: the caller refuses the message
 }
 
-bool PoolOwner::isState(const layout::ChunkRef& ref, ChunkState state) const noexcept {
-  return ref.side == place_.side && ref.segment < bulks_.size() &&
-         ref.chunk < bulks_[ref.segment].states.size() &&
-         bulks_[ref.segment].states[ref.chunk] == state;
-}
-
-void PoolOwner::lend(const layout::ChunkRef& ref) noexcept {
-  bulks_[ref.segment].states[ref.chunk] = ChunkState::lent;
-}
-
-std::optional<Chunk> PoolOwner::tryReceiveBack(const layout::ChunkRef& ref) noexcept {
-  if (!isState(ref, ChunkState::lent)) return std::nullopt;
-  auto& bulk = bulks_[ref.segment];
-  bulk.states[ref.chunk] = ChunkState::held;
-  MPF_STEP(chunk_back);
-  return Chunk{bulk.chunk(ref.chunk), bulk.chunkBytes, ref};
-}
-
-void PoolOwner::free(const layout::ChunkRef& ref) noexcept {
-  auto& bulk = bulks_[ref.segment];
-  bulk.states[ref.chunk] = ChunkState::free;
-  bulk.free.push_back(ref.chunk);
-  --inUse_;
-}
-
 void PoolOwner::collectReturned() noexcept {
   // PAIR(chunk-returned): the borrower has finished with the chunk.
   const auto returned = returns_->returned.load(std::memory_order_acquire);
@@ -126,26 +101,14 @@ void PoolOwner::collectReturned() noexcept {
       loans_.takeBack(packed & ~layout::kReturnsFanOut);
       continue;
     }
-    const layout::ChunkRef ref{packed / layout::kMaxChunks, packed % layout::kMaxChunks,
-                               place_.side, 0};
-    if (tryReceiveBack(ref)) free(ref);
+    const ChunkPlace place{packed / layout::kMaxChunks, packed % layout::kMaxChunks};
+    if (tryReceiveBack(place)) free(place);
   }
 }
 
-std::optional<layout::ChunkRef> PoolOwner::tryFind(const std::byte* data) const noexcept {
-  for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
-    const auto& bulk = bulks_[segment];
-    const auto* start = bulk.segment.data() + layout::kBulkChunksOffset;
-    if (data < start || data >= bulk.segment.data() + bulk.segment.bytes()) continue;
-    return layout::ChunkRef{
-        segment,
-        static_cast<std::uint32_t>(static_cast<std::size_t>(data - start) / bulk.chunkBytes),
-        place_.side, 0};
-  }
-  return std::nullopt;
-}
-
-bool PoolBorrower::tryMap(std::uint32_t number) {
+bool PoolBorrower::tryMap(std::uint32_t number) try {
+  if (number >= kMaxBulks) return false;
+  if (number >= bulks_.size()) bulks_.resize(number + 1);
   auto segment =
       Segment::tryOpen(SegmentName::bulk(place_.backplane, place_.link, place_.side, number),
                        layout::SegmentKind::bulk, Segment::Access::readWrite);
@@ -160,43 +123,20 @@ bool PoolBorrower::tryMap(std::uint32_t number) {
   bytes_ += segment->bytes();
   bulks_[number] = {std::move(*segment), header.chunkBytes, header.chunkCount};
   return true;
-}
-
-std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) try {
-  if (ref.segment >= kMaxBulks || ref.side != place_.side) return std::nullopt;
-  if (ref.segment >= bulks_.size()) bulks_.resize(ref.segment + 1);
-  const auto& bulk = bulks_[ref.segment];
-  if (!bulk.segment && !tryMap(ref.segment)) return std::nullopt;
-  if (ref.chunk >= bulk.chunkCount || bulk.segment.isLost()) return std::nullopt;
-  return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + ref.chunk * bulk.chunkBytes,
-               bulk.chunkBytes, ref};
 } catch (const SegmentError&) {
-  return std::nullopt;
+  return false;
 }
 
-void PoolBorrower::giveBack(const layout::ChunkRef& ref) noexcept {
-  const auto packed = ref.side == layout::kFanOutSide
-                          ? layout::kReturnsFanOut | ref.segment
-                          : ref.segment * layout::kMaxChunks + ref.chunk % layout::kMaxChunks;
+std::optional<Chunk> PoolBorrower::tryBorrow(ChunkPlace place) {
+  return isMapped(place.segment) || tryMap(place.segment) ? tryBorrowMapped(place) : std::nullopt;
+}
+
+void PoolBorrower::returnPacked(std::uint32_t packed) noexcept {
   returns_->chunks[returned_ % layout::kReturnSlots].store(packed, std::memory_order_relaxed);
   MPF_STEP(chunk_noted);
   // PAIR(chunk-returned): we have finished with the chunk.
   returns_->returned.store(++returned_, std::memory_order_release);
   MPF_STEP(chunk_returned);
-}
-
-std::optional<layout::ChunkRef> PoolBorrower::tryFind(const std::byte* data) const noexcept {
-  for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
-    const auto& bulk = bulks_[segment];
-    if (!bulk.segment || data < bulk.segment.data() ||
-        data >= bulk.segment.data() + bulk.segment.bytes())
-      continue;
-    const auto offset =
-        static_cast<std::size_t>(data - bulk.segment.data()) - layout::kBulkChunksOffset;
-    return layout::ChunkRef{segment, static_cast<std::uint32_t>(offset / bulk.chunkBytes),
-                            place_.side, 0};
-  }
-  return std::nullopt;
 }
 
 void removeBulk(std::string_view backplane, std::uint64_t link) {

@@ -19,6 +19,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/step.h"
 #include "shm/fan_out_loans.h"
 #include "shm/fork_guard.h"
 #include "shm/layout.h"
@@ -29,7 +30,17 @@ namespace mpf {
 struct Chunk {
   std::byte* data{};
   std::size_t capacity{};
-  layout::ChunkRef ref{};
+  // Of a chunk that a client received from the fan-out pool of its server:
+  bool isFanOut = false;
+  std::uint32_t missed = 0;  // as in layout::ChunkRef
+};
+// The position of a chunk in a pool. Functions on the path of a message that take or return one are
+// inline: otherwise g++ stores its numbers one by one and loads both at once, and such a load waits
+// for the stores.
+struct ChunkPlace {
+  std::uint32_t segment{};
+  std::uint32_t chunk{};
+  friend bool operator==(const ChunkPlace&, const ChunkPlace&) = default;
 };
 
 // Identifies the pool of one side of a link.
@@ -39,6 +50,21 @@ struct PoolPlace {
   std::uint32_t side{};
   std::uint64_t ownerWindow{};
 };
+
+// The chunk of a pointer into one of these bulk segments.
+template <class Bulks>
+[[gnu::always_inline]] inline std::optional<ChunkPlace> tryFindIn(const Bulks& bulks,
+                                                                  const std::byte* data) noexcept {
+  for (std::uint32_t number = 0; number < bulks.size(); ++number) {
+    const auto& segment = bulks[number].segment;
+    if (!segment) continue;
+    const auto offset = static_cast<std::size_t>(data - segment.data());
+    if (offset < layout::kBulkChunksOffset || offset >= segment.bytes()) continue;
+    const auto chunk = (offset - layout::kBulkChunksOffset) / bulks[number].chunkBytes;
+    return ChunkPlace{number, static_cast<std::uint32_t>(chunk)};
+  }
+  return std::nullopt;
+}
 
 class PoolOwner {
  public:
@@ -50,13 +76,29 @@ class PoolOwner {
   // many chunks.
   std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept;
   // Gives the chunk to the peer, until the peer returns it.
-  void lend(const layout::ChunkRef& ref) noexcept;
+  void lend(ChunkPlace place) noexcept {
+    bulks_[place.segment].states[place.chunk] = ChunkState::lent;
+  }
   // Takes back a chunk that the peer sent in a message; nullopt if we had not lent it.
-  std::optional<Chunk> tryReceiveBack(const layout::ChunkRef& ref) noexcept;
+  [[gnu::always_inline]] std::optional<Chunk> tryReceiveBack(ChunkPlace place) noexcept {
+    if (!isLent(place)) return std::nullopt;
+    auto& bulk = bulks_[place.segment];
+    bulk.states[place.chunk] = ChunkState::held;
+    MPF_STEP(chunk_back);
+    return Chunk{bulk.chunk(place.chunk), bulk.chunkBytes};
+  }
   // Frees a chunk that is not lent.
-  void free(const layout::ChunkRef& ref) noexcept;
+  [[gnu::always_inline]] void free(ChunkPlace place) noexcept {
+    auto& bulk = bulks_[place.segment];
+    bulk.states[place.chunk] = ChunkState::free;
+    bulk.free.push_back(place.chunk);
+    --inUse_;
+  }
   // The chunk of a pointer; nullopt if the pointer is not into this pool.
-  std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
+  [[nodiscard, gnu::always_inline]] std::optional<ChunkPlace> tryFind(
+      const std::byte* data) const noexcept {
+    return tryFindIn(bulks_, data);
+  }
   // Memory of all segments of this pool.
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
   // Takes what the peer has returned through the ring.
@@ -82,7 +124,10 @@ class PoolOwner {
     }
   };
   bool addBulk(std::size_t chunkBytes);
-  bool isState(const layout::ChunkRef& ref, ChunkState state) const noexcept;
+  [[nodiscard]] bool isLent(ChunkPlace place) const noexcept {
+    return place.segment < bulks_.size() && place.chunk < bulks_[place.segment].states.size() &&
+           bulks_[place.segment].states[place.chunk] == ChunkState::lent;
+  }
 
   ForkGuard forkGuard_;
   PoolPlace place_;
@@ -104,10 +149,26 @@ class PoolBorrower {
 
   // Maps a chunk that the peer sent; nullopt if there is no such chunk.
   //   throws  std::system_error, std::bad_alloc: no free descriptor or no memory to map it
-  std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
-  // Returns a chunk to the peer, also one of its fan-out pool.
-  void giveBack(const layout::ChunkRef& ref) noexcept;
-  std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
+  std::optional<Chunk> tryBorrow(ChunkPlace place);
+  // The same for a chunk whose segment is mapped already; nullopt for every other one.
+  [[gnu::always_inline]] std::optional<Chunk> tryBorrowMapped(ChunkPlace place) noexcept {
+    if (!isMapped(place.segment)) return std::nullopt;
+    const auto& bulk = bulks_[place.segment];
+    if (place.chunk >= bulk.chunkCount || bulk.segment.isLost()) return std::nullopt;
+    return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + place.chunk * bulk.chunkBytes,
+                 bulk.chunkBytes};
+  }
+  // Returns a chunk to the peer, or one of its fan-out pool.
+  void giveBack(ChunkPlace place) noexcept {
+    returnPacked(place.segment * layout::kMaxChunks + place.chunk % layout::kMaxChunks);
+  }
+  void giveBackFanOut(std::uint32_t number) noexcept {
+    returnPacked(layout::kReturnsFanOut | number);
+  }
+  [[nodiscard, gnu::always_inline]] std::optional<ChunkPlace> tryFind(
+      const std::byte* data) const noexcept {
+    return tryFindIn(bulks_, data);
+  }
 
  private:
   struct Bulk {
@@ -115,7 +176,11 @@ class PoolBorrower {
     std::size_t chunkBytes{};
     std::uint32_t chunkCount{};
   };
+  [[nodiscard]] bool isMapped(std::uint32_t number) const noexcept {
+    return number < bulks_.size() && bulks_[number].segment;
+  }
   bool tryMap(std::uint32_t number);
+  void returnPacked(std::uint32_t packed) noexcept;
   PoolPlace place_;
   std::uint64_t maxBytes_;  // most memory that the peer can make us map
   std::uint64_t bytes_ = 0;

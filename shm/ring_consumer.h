@@ -15,6 +15,8 @@
 #include <span>
 #include <utility>
 
+#include <mpf/detail/copy_words.h>
+
 #include "base/step.h"
 #include "shm/cache_line.h"
 #include "shm/cpu_relax.h"
@@ -76,6 +78,18 @@ class RingConsumer {
 
   // The body bytes in the first slot of the message begun.
   [[nodiscard]] FirstBody firstBody() const noexcept { return FirstBody::of(first_->body.data()); }
+  // The reference in the first slot of the message begun, whose body is in a chunk.
+  [[nodiscard, gnu::always_inline]] layout::ChunkRef chunkRef() const noexcept {
+    using layout::ChunkRef;
+    const auto word = [&](std::size_t at) {
+      std::uint32_t value = 0;
+      std::memcpy(&value, first_->body.data() + at, sizeof value);
+      return detail::alone(value);  // read once: a peer may change it
+    };
+    return {word(offsetof(ChunkRef, segment)), word(offsetof(ChunkRef, chunk)),
+            word(offsetof(ChunkRef, side)), word(offsetof(ChunkRef, missed)),
+            word(offsetof(ChunkRef, cmd))};
+  }
   // Copies the body of the message begun. `body` must not be longer than inlineCapacity().
   void copyBody(std::span<std::byte> body) const noexcept {
     const auto& first = *first_;

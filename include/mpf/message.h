@@ -179,7 +179,7 @@ class Message {
   [[nodiscard]] static Message adopt(MessageType type, BodyBytes body,
                                      const Attributes& attributes = {}) noexcept {
     Message message;
-    message.setAll(type, kOutside, attributes);
+    message.setAll(type, kOutside, inRegisters(attributes));
     message.state_.at.body = body;
     message.check();
     return message;
@@ -336,6 +336,16 @@ class Message {
     }
   };
 
+  // For attributes that were written just before, and not in the function that copies them: see
+  // copy_words.h.
+  static Attributes inRegisters(const Attributes& all) noexcept {
+    using detail::alone;
+    return {{alone(all.route.link), alone(all.route.requestId), alone(all.route.flags),
+             alone(all.route.keeper)},
+            alone(all.clientType),
+            alone(all.clientExtra),
+            alone(all.timeStampNs)};
+  }
   void setAll(MessageType type, std::uint8_t inlineSize, const Attributes& attributes) noexcept {
     state_.type = type;
     state_.inlineSize = inlineSize;

@@ -43,15 +43,35 @@ std::int32_t MessageLink::cmdOfLong(BodyFields body) const noexcept {
   return cmd;
 }
 
-Message MessageLink::finishLong(BodyFields fields, const Message::Attributes& attributes,
-                                Finish& finish) noexcept {
-  auto message = readBody(fields, attributes, finish);
-  link_->incoming().end();
-  return message;
+// This and readBody() are inline in finishLong(): a chunk or attributes that one function stores and
+// another one copies would wait for the stores.
+[[gnu::always_inline]] inline Message MessageLink::readChunk(BodyFields fields,
+                                                             const Message::Attributes& attributes,
+                                                             Finish& finish) {
+  std::optional<Chunk> chunk;
+  {
+    const BiasedLock::Guard guard(*lock_);
+    chunk = link_->tryChunk(fields.bodyBytes);
+    if (chunk) ++lent_;
+  }
+  if (!chunk) {
+    finish = Finish::invalid;
+    return {};
+  }
+  const auto type = static_cast<MessageType>(fields.type);
+  const BodyBytes body{chunk->data, fields.bodyBytes, chunk->capacity, this};
+  if (!chunk->isFanOut) return Message::adopt(type, body, attributes);
+  // The program may have written to the last message in this mapping. Without the lock, because
+  // this takes longer than anything else.
+  private_pages::drop(chunk->data, chunk->capacity);
+  auto shared = attributes;
+  shared.route.flags |= Message::missedFlags(chunk->missed);
+  return Message::adopt(type, body, shared);
 }
 
-Message MessageLink::readBody(BodyFields fields, const Message::Attributes& attributes,
-                              Finish& finish) noexcept try {
+[[gnu::always_inline]] inline Message MessageLink::readBody(BodyFields fields,
+                                                            const Message::Attributes& attributes,
+                                                            Finish& finish) noexcept try {
   const auto type = static_cast<MessageType>(fields.type);
   finish = Finish::message;
   if ((fields.flags & layout::kSlotChunk) != 0) return readChunk(fields, attributes, finish);
@@ -74,27 +94,11 @@ Message MessageLink::readBody(BodyFields fields, const Message::Attributes& attr
   return {};
 }
 
-Message MessageLink::readChunk(BodyFields fields, const Message::Attributes& attributes,
-                               Finish& finish) {
-  const auto chunk = [&] {
-    const BiasedLock::Guard guard(*lock_);
-    auto one = link_->tryChunk(fields.bodyBytes);
-    if (one) ++lent_;
-    return one;
-  }();
-  if (!chunk) {
-    finish = Finish::invalid;
-    return {};
-  }
-  const auto type = static_cast<MessageType>(fields.type);
-  const BodyBytes body{chunk->data, fields.bodyBytes, chunk->capacity, this};
-  if (chunk->ref.side != layout::kFanOutSide) return Message::adopt(type, body, attributes);
-  // The program may have written to the last message in this mapping. Without the lock, because
-  // this takes longer than anything else.
-  private_pages::drop(chunk->data, chunk->capacity);
-  auto shared = attributes;
-  shared.route.flags |= Message::missedFlags(chunk->ref.missed);
-  return Message::adopt(type, body, shared);
+Message MessageLink::finishLong(BodyFields fields, const Message::Attributes& attributes,
+                                Finish& finish) noexcept {
+  auto message = readBody(fields, attributes, finish);
+  link_->incoming().end();
+  return message;
 }
 
 void MessageLink::discard(BodyFields body) noexcept {

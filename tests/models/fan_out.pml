@@ -12,7 +12,7 @@
 //   MODELS  shm/fan_out_pool.cpp: tryClaim tryReuse
 //   MODELS  shm/fan_out_loans.cpp: tryLend takeBack endAll retireAll
 //   MODELS  shm/link.cpp: trySendFanOut endFanOut
-//   MODELS  shm/pool.cpp: collectReturned giveBack
+//   MODELS  shm/pool.cpp: collectReturned returnPacked
 //   MODELS  server/publisher.cpp: publish collectReturned
 //   HOLDS   no chunk is written that a living client reads or can still take, unless this client
 //           has returned it early

@@ -89,7 +89,7 @@ TEST_F(PublisherTest, EachClientReadsTheSameChunkAndGetsTheMarksOfItsOwnRequest)
     const auto chunk = subscriber->link.tryChunk(envelope.bodyBytes);
     ASSERT_TRUE(chunk);
     EXPECT_EQ(elementOf(*chunk), 1.5);
-    EXPECT_EQ(chunk->ref.side, layout::kFanOutSide);
+    EXPECT_TRUE(chunk->isFanOut);
   }
 }
 
@@ -115,7 +115,7 @@ TEST_F(PublisherTest, AClientThatReturnsNothingGetsABoundedNumberAndIsToldWhatIt
     ASSERT_EQ(publish(message, quick.request), ReplyResult::sent);
     const auto chunk = borrow(quick.link);
     ASSERT_EQ(elementOf(chunk), i);
-    ASSERT_EQ(chunk.ref.missed, 0u);
+    ASSERT_EQ(chunk.missed, 0u);
     quick.link.release(chunk.data);
   }
   EXPECT_LE(files(), kMaxBorrowed + 3u);
@@ -124,14 +124,14 @@ TEST_F(PublisherTest, AClientThatReturnsNothingGetsABoundedNumberAndIsToldWhatIt
   for (int i = 0; i < kMaxBorrowed; ++i) {
     const auto chunk = borrow(slow.link);
     EXPECT_EQ(elementOf(chunk), i);
-    EXPECT_EQ(chunk.ref.missed, 0u);
+    EXPECT_EQ(chunk.missed, 0u);
     slow.link.release(chunk.data);
   }
   ASSERT_EQ(publish(filled(100), slow.request), ReplyResult::sent);
   ASSERT_EQ(publish(filled(101), slow.request), ReplyResult::sent);
 
-  EXPECT_EQ(borrow(slow.link).ref.missed, 100u - kMaxBorrowed);
-  EXPECT_EQ(borrow(slow.link).ref.missed, 0u);
+  EXPECT_EQ(borrow(slow.link).missed, 100u - kMaxBorrowed);
+  EXPECT_EQ(borrow(slow.link).missed, 0u);
 }
 
 TEST_F(PublisherTest, EachRequestOfAClientIsToldItsOwnNumber) {
@@ -146,8 +146,8 @@ TEST_F(PublisherTest, EachRequestOfAClientIsToldItsOwnNumber) {
   ASSERT_EQ(publish(filled(0), other), ReplyResult::sent);
   ASSERT_EQ(publish(filled(0), subscriber.request), ReplyResult::sent);
 
-  EXPECT_EQ(borrow(subscriber.link).ref.missed, 0u);
-  EXPECT_EQ(borrow(subscriber.link).ref.missed, 5u);
+  EXPECT_EQ(borrow(subscriber.link).missed, 0u);
+  EXPECT_EQ(borrow(subscriber.link).missed, 5u);
 }
 
 TEST_F(PublisherTest, FindsFreeChunksAlsoWhenNothingCanBeSent) {
@@ -198,7 +198,7 @@ TEST_F(PublisherTest, RefusesATooLargeMessageWithoutCountingIt) {
   EXPECT_EQ(publish(large, subscriber.request), ReplyResult::tooLarge);
   EXPECT_EQ(publish(filled(0), subscriber.request), ReplyResult::sent);
 
-  EXPECT_EQ(borrow(subscriber.link).ref.missed, 0u);
+  EXPECT_EQ(borrow(subscriber.link).missed, 0u);
 }
 
 TEST_F(PublisherTest, CountsWhatItHasNoMemoryFor) {
@@ -212,7 +212,7 @@ TEST_F(PublisherTest, CountsWhatItHasNoMemoryFor) {
 
   ASSERT_EQ(publish(filled(0), subscriber.request), ReplyResult::sent);
 
-  EXPECT_EQ(borrow(subscriber.link).ref.missed, 1u);
+  EXPECT_EQ(borrow(subscriber.link).missed, 1u);
 }
 
 TEST_F(PublisherTest, AClientThatLeavesWhileItReadsKeepsItsMessageUnchanged) {

@@ -20,8 +20,8 @@ class FanOutBorrowerTest : public ShmTest {
   static constexpr std::uint64_t kServer = 0xabc;
   static constexpr std::size_t kBytes = 100'000;
 
-  static layout::ChunkRef refTo(const FanOutChunk& chunk) {
-    return {chunk.number(), 0, layout::kFanOutSide, 0};
+  std::optional<Chunk> tryBorrow(const FanOutChunk& chunk) {
+    return borrower_.tryBorrow({chunk.number(), 0}, 0);
   }
   std::shared_ptr<FanOutChunk> allocFilled(int with) {
     auto chunk = pool_->tryAlloc(kBytes);
@@ -48,7 +48,7 @@ class FanOutBorrowerTest : public ShmTest {
 TEST_F(FanOutBorrowerTest, ReadsTheChunkOfTheServer) {
   const auto chunk = allocFilled(7);
 
-  const auto borrowed = borrower_.tryBorrow(refTo(*chunk));
+  const auto borrowed = tryBorrow(*chunk);
 
   ASSERT_TRUE(borrowed);
   EXPECT_EQ(borrowed->capacity, chunk->capacity());
@@ -57,8 +57,8 @@ TEST_F(FanOutBorrowerTest, ReadsTheChunkOfTheServer) {
 
 TEST_F(FanOutBorrowerTest, WritesNeitherTheChunkNorOtherViewsOfIt) {
   const auto chunk = allocFilled(7);
-  const auto one = borrower_.tryBorrow(refTo(*chunk));
-  const auto two = borrower_.tryBorrow(refTo(*chunk));
+  const auto one = tryBorrow(*chunk);
+  const auto two = tryBorrow(*chunk);
   ASSERT_TRUE(one && two);
 
   std::memset(one->data, 1, kBytes);
@@ -69,13 +69,13 @@ TEST_F(FanOutBorrowerTest, WritesNeitherTheChunkNorOtherViewsOfIt) {
 
 TEST_F(FanOutBorrowerTest, ShowsTheNextContentsAfterAWrite) {
   const auto chunk = allocFilled(7);
-  const auto first = borrower_.tryBorrow(refTo(*chunk));
+  const auto first = tryBorrow(*chunk);
   first->data[5000] = std::byte{1};
   private_pages::drop(first->data, first->capacity);
   ASSERT_TRUE(borrower_.tryRelease(first->data));
   std::memset(chunk->data(), 8, kBytes);
 
-  const auto next = borrower_.tryBorrow(refTo(*chunk));
+  const auto next = tryBorrow(*chunk);
 
   EXPECT_EQ(next->data, first->data) << "the mapping is used again";
   EXPECT_EQ(std::memcmp(next->data, chunk->data(), kBytes), 0);
@@ -83,28 +83,27 @@ TEST_F(FanOutBorrowerTest, ShowsTheNextContentsAfterAWrite) {
 
 TEST_F(FanOutBorrowerTest, ReleasesOnlyWhatItHolds) {
   const auto chunk = allocFilled(7);
-  const auto borrowed = borrower_.tryBorrow(refTo(*chunk));
+  const auto borrowed = tryBorrow(*chunk);
 
   EXPECT_FALSE(borrower_.tryRelease(borrowed->data + 1));
   const auto released = borrower_.tryRelease(borrowed->data);
   EXPECT_FALSE(borrower_.tryRelease(borrowed->data));
 
   ASSERT_TRUE(released);
-  EXPECT_EQ(released->segment, chunk->number());
-  EXPECT_EQ(released->side, layout::kFanOutSide);
+  EXPECT_EQ(*released, chunk->number());
 }
 
 TEST_F(FanOutBorrowerTest, RefusesWhatIsNoChunkOfTheServer) {
   const auto chunk = allocFilled(7);
 
-  EXPECT_FALSE(borrower_.tryBorrow({chunk->number() + 1, 0, layout::kFanOutSide, 0}));
-  EXPECT_FALSE(borrower_.tryBorrow({chunk->number(), 1, layout::kFanOutSide, 0}));
-  EXPECT_FALSE(borrower_.tryBorrow({chunk->number(), 0, 1, 0}));
+  EXPECT_FALSE(borrower_.tryBorrow({chunk->number() + 1, 0}, 0));
+  EXPECT_FALSE(borrower_.tryBorrow({chunk->number(), 1}, 0));
+  EXPECT_FALSE(borrower_.tryBorrow({UINT32_MAX, 0}, 0));
 }
 
 TEST_F(FanOutBorrowerTest, StaysReadableWhenTheServerRemovesThePool) {
   const auto chunk = allocFilled(7);
-  const auto borrowed = borrower_.tryBorrow(refTo(*chunk));
+  const auto borrowed = tryBorrow(*chunk);
 
   pool_.reset();
 
@@ -114,7 +113,7 @@ TEST_F(FanOutBorrowerTest, StaysReadableWhenTheServerRemovesThePool) {
 TEST_F(FanOutBorrowerTest, UnmapsWhatTheServerHasRemoved) {
   for (int i = 0; i < 20; ++i) {
     const auto chunk = allocFilled(i);
-    const auto borrowed = borrower_.tryBorrow(refTo(*chunk));
+    const auto borrowed = tryBorrow(*chunk);
     ASSERT_TRUE(borrowed && borrower_.tryRelease(borrowed->data));
     chunk->retire();
     chunk->drop();
@@ -128,10 +127,10 @@ TEST_F(FanOutBorrowerTest, MapsABoundedNumberOfSegments) {
   std::vector<std::shared_ptr<FanOutChunk>> chunks;
   std::size_t held = 0;
   while (chunks.size() < FanOutBorrower::kMaxMappings) chunks.push_back(pool_->tryAlloc(1));
-  for (const auto& chunk : chunks) held += borrower_.tryBorrow(refTo(*chunk)) ? 1 : 0;
+  for (const auto& chunk : chunks) held += tryBorrow(*chunk) ? 1 : 0;
   EXPECT_EQ(held, FanOutBorrower::kMaxMappings);
 
-  EXPECT_FALSE(borrower_.tryBorrow(refTo(*chunks[0]))) << "would need another mapping";
+  EXPECT_FALSE(tryBorrow(*chunks[0])) << "would need another mapping";
 }
 
 }  // namespace

@@ -13,8 +13,6 @@
 namespace mpf::test {
 namespace {
 
-using layout::ChunkRef;
-
 class PoolTest : public ShmTest {
  protected:
   static constexpr std::uint64_t kLink = 0xabc;
@@ -28,11 +26,11 @@ class PoolTest : public ShmTest {
     owner_.reset();  // removes the names of its segments
     owner_.emplace(place_, Rights{}, maxBytes, returns_);
   }
-  ChunkRef lendOne(std::size_t bytes = 1000) {
-    const auto chunk = owner_->tryAlloc(bytes);
-    EXPECT_TRUE(chunk);
-    owner_->lend(chunk->ref);
-    return chunk->ref;
+  ChunkPlace placeOf(const Chunk& chunk) const { return owner_->tryFind(chunk.data).value(); }
+  ChunkPlace lendOne(std::size_t bytes = 1000) {
+    const auto place = placeOf(owner_->tryAlloc(bytes).value());
+    owner_->lend(place);
+    return place;
   }
   // The writable header of the owner's bulk segment `number`.
   Segment openBulk(std::uint32_t number = 0) const {
@@ -57,8 +55,8 @@ TEST_P(ChunkSizes, AreAtLeastTheRequestedSizeAndTheBorrowerSeesAllBytes) {
   ASSERT_GE(chunk->capacity, bytes);
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(chunk->data) % layout::kCacheLineBytes, 0u);
   std::memset(chunk->data, 0x5a, chunk->capacity);
-  owner_->lend(chunk->ref);
-  const auto borrowed = borrower_.tryBorrow(chunk->ref);
+  owner_->lend(placeOf(*chunk));
+  const auto borrowed = borrower_.tryBorrow(placeOf(*chunk));
 
   ASSERT_TRUE(borrowed);
   EXPECT_EQ(borrowed->capacity, chunk->capacity);
@@ -92,9 +90,9 @@ TEST_F(PoolTest, ReusesAReturnedChunk) {
   const auto bytes = owner_->bytes();
 
   for (int i = 0; i < 10'000; ++i) {
-    const auto ref = lendOne();
-    ASSERT_TRUE(borrower_.tryBorrow(ref));
-    borrower_.giveBack(ref);
+    const auto lent = lendOne();
+    ASSERT_TRUE(borrower_.tryBorrow(lent));
+    borrower_.giveBack(lent);
   }
 
   EXPECT_EQ(owner_->bytes(), bytes);
@@ -103,57 +101,52 @@ TEST_F(PoolTest, ReusesAReturnedChunk) {
 TEST_F(PoolTest, HoldsAChunkThatThePeerSendsBack) {
   const auto chunk = owner_->tryAlloc(1000);
   ASSERT_TRUE(chunk);
-  owner_->lend(chunk->ref);
+  owner_->lend(placeOf(*chunk));
 
-  const auto back = owner_->tryReceiveBack(chunk->ref);
+  const auto back = owner_->tryReceiveBack(placeOf(*chunk));
 
   ASSERT_TRUE(back);
   EXPECT_EQ(back->data, chunk->data);
   EXPECT_EQ(back->capacity, chunk->capacity);
-  EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "already received back";
-  owner_->free(back->ref);
-  EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "after it was freed";
+  EXPECT_FALSE(owner_->tryReceiveBack(placeOf(*chunk))) << "already received back";
+  owner_->free(placeOf(*back));
+  EXPECT_FALSE(owner_->tryReceiveBack(placeOf(*chunk))) << "after it was freed";
 }
 
 TEST_F(PoolTest, TheOwnerRefusesAnInvalidReference) {
   const auto lent = lendOne();
-  const auto held = owner_->tryAlloc(1000)->ref;
+  const auto held = placeOf(owner_->tryAlloc(1000).value());
   ASSERT_FALSE(owner_->tryReceiveBack(held)) << "not lent";
 
   for (const auto& wrong :
-       {ChunkRef{lent.segment, lent.chunk, 0, 0}, ChunkRef{lent.segment, lent.chunk, 2, 0},
-        ChunkRef{lent.segment + 1, lent.chunk, kSide, 0},
-        ChunkRef{lent.segment, 1u << 20, kSide, 0}, ChunkRef{UINT32_MAX, UINT32_MAX, kSide, 0},
-        ChunkRef{lent.segment, lent.chunk + 2, kSide, 0}}) {
-    EXPECT_FALSE(owner_->tryReceiveBack(wrong))
-        << wrong.segment << ' ' << wrong.chunk << ' ' << wrong.side;
+       {ChunkPlace{lent.segment + 1, lent.chunk}, ChunkPlace{lent.segment, 1u << 20},
+        ChunkPlace{UINT32_MAX, UINT32_MAX}, ChunkPlace{lent.segment, lent.chunk + 2}}) {
+    EXPECT_FALSE(owner_->tryReceiveBack(wrong)) << wrong.segment << ' ' << wrong.chunk;
   }
   EXPECT_TRUE(owner_->tryReceiveBack(lent));
 }
 
 TEST_F(PoolTest, TheBorrowerRefusesAnInvalidReference) {
-  const auto ref = lendOne();
+  const auto lent = lendOne();
   const auto count = openBulk().header().chunkCount;
 
   for (const auto& wrong :
-       {ChunkRef{ref.segment, ref.chunk, 0, 0}, ChunkRef{ref.segment, count, kSide, 0},
-        ChunkRef{ref.segment, UINT32_MAX, kSide, 0}, ChunkRef{ref.segment + 1, 0, kSide, 0},
-        ChunkRef{256, 0, kSide, 0}, ChunkRef{UINT32_MAX, 0, kSide, 0}}) {
-    EXPECT_FALSE(borrower_.tryBorrow(wrong))
-        << wrong.segment << ' ' << wrong.chunk << ' ' << wrong.side;
+       {ChunkPlace{lent.segment, count}, ChunkPlace{lent.segment, UINT32_MAX},
+        ChunkPlace{lent.segment + 1, 0}, ChunkPlace{256, 0}, ChunkPlace{UINT32_MAX, 0}}) {
+    EXPECT_FALSE(borrower_.tryBorrow(wrong)) << wrong.segment << ' ' << wrong.chunk;
   }
-  EXPECT_TRUE(borrower_.tryBorrow(ref));
+  EXPECT_TRUE(borrower_.tryBorrow(lent));
 }
 
 class BulkHeaders : public PoolTest,
                     public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
 TEST_P(BulkHeaders, AreRefusedByTheBorrowerIfInvalid) {
-  const auto ref = lendOne();
+  const auto lent = lendOne();
 
   GetParam()(openBulk().sharedHeader());
 
-  EXPECT_FALSE(borrower_.tryBorrow(ref));
+  EXPECT_FALSE(borrower_.tryBorrow(lent));
 }
 INSTANTIATE_TEST_SUITE_P(
     Invalid, BulkHeaders,
@@ -170,9 +163,9 @@ INSTANTIATE_TEST_SUITE_P(
                     [](layout::SegmentHeader& header) { header.totalBytes = UINT64_MAX; }));
 
 TEST_F(PoolTest, FreesAChunkOnceIfItIsReturnedTwice) {
-  const auto ref = lendOne();
-  borrower_.giveBack(ref);
-  borrower_.giveBack(ref);
+  const auto lent = lendOne();
+  borrower_.giveBack(lent);
+  borrower_.giveBack(lent);
 
   std::set<std::byte*> chunks;
   for (int i = 0; i < 100; ++i) chunks.insert(owner_->tryAlloc(1000)->data);
@@ -182,7 +175,7 @@ TEST_F(PoolTest, FreesAChunkOnceIfItIsReturnedTwice) {
 
 TEST_F(PoolTest, ReturningAChunkThatIsNotLentFreesNothing) {
   const auto held = owner_->tryAlloc(1000);
-  borrower_.giveBack(held->ref);
+  borrower_.giveBack(placeOf(*held));
 
   EXPECT_NE(owner_->tryAlloc(1000)->data, held->data);
 }
@@ -197,7 +190,7 @@ TEST_F(PoolTest, RefusesAChunkAboveItsLimitUntilAnotherIsFreed) {
   EXPECT_GE(chunks.size(), 10u);
   EXPECT_LE(owner_->bytes(), kLimit);
   EXPECT_FALSE(owner_->tryAlloc(kLimit));
-  owner_->free(chunks.back().ref);
+  owner_->free(placeOf(chunks.back()));
   EXPECT_EQ(owner_->tryAlloc(50'000)->data, chunks.back().data);
 }
 
@@ -222,29 +215,28 @@ TEST_F(PoolTest, RefusesSizesAboveAnyLimit) {
 }
 
 TEST_F(PoolTest, LendsNoMoreChunksThanTheReturnRingHolds) {
-  std::vector<ChunkRef> lent;
+  std::vector<ChunkPlace> lent;
   for (std::uint32_t i = 0; i < layout::kReturnSlots; ++i) lent.push_back(lendOne(100));
 
   EXPECT_FALSE(owner_->tryAlloc(100));
 
-  for (const auto& ref : lent) borrower_.giveBack(ref);
+  for (const auto& place : lent) borrower_.giveBack(place);
   for (std::uint32_t i = 0; i < layout::kReturnSlots; ++i)
     ASSERT_TRUE(owner_->tryAlloc(100)) << "all chunks were returned: " << i;
 }
 
 TEST_F(PoolTest, RecognizesPointersIntoItself) {
   const auto chunk = *owner_->tryAlloc(1000);
-  owner_->lend(chunk.ref);
-  const auto borrowed = *borrower_.tryBorrow(chunk.ref);
+  owner_->lend(placeOf(chunk));
+  const auto borrowed = *borrower_.tryBorrow(placeOf(chunk));
   const std::byte elsewhere{};
 
   const auto found = owner_->tryFind(chunk.data);
   const auto inside = borrower_.tryFind(borrowed.data + 10);
 
   ASSERT_TRUE(found && inside);
-  EXPECT_EQ(found->chunk, chunk.ref.chunk);
-  EXPECT_EQ(found->side, kSide);
-  EXPECT_EQ(inside->chunk, chunk.ref.chunk);
+  EXPECT_EQ(owner_->tryFind(chunk.data + 999), found);
+  EXPECT_EQ(inside, found);
   EXPECT_FALSE(owner_->tryFind(borrowed.data));
   EXPECT_FALSE(borrower_.tryFind(chunk.data));
   EXPECT_FALSE(owner_->tryFind(&elsewhere));
@@ -254,8 +246,8 @@ TEST_F(PoolTest, RecognizesPointersIntoItself) {
 TEST_F(PoolTest, BorrowedMemoryStaysReadableAfterTheOwnerIsDestroyed) {
   const auto chunk = *owner_->tryAlloc(1000);
   chunk.data[999] = std::byte{7};
-  owner_->lend(chunk.ref);
-  const auto borrowed = *borrower_.tryBorrow(chunk.ref);
+  owner_->lend(placeOf(chunk));
+  const auto borrowed = *borrower_.tryBorrow(placeOf(chunk));
 
   owner_.reset();
 
@@ -298,9 +290,9 @@ TEST_F(PoolTest, NoChunkHasTwoHoldersIfTheBorrowerWritesInvalidData) {
       case 2:
         if (held.empty()) break;
         if (random.oneIn(2)) {
-          owner_->free(held.begin()->second.ref);
+          owner_->free(placeOf(held.begin()->second));
         } else {
-          owner_->lend(held.begin()->second.ref);
+          owner_->lend(placeOf(held.begin()->second));
           lent.push_back(held.begin()->second);
         }
         held.erase(held.begin());
@@ -308,7 +300,7 @@ TEST_F(PoolTest, NoChunkHasTwoHoldersIfTheBorrowerWritesInvalidData) {
       case 3:
         if (lent.empty()) break;
         if (const auto& one = lent[random.below(lent.size())];
-            const auto back = owner_->tryReceiveBack(one.ref)) {
+            const auto back = owner_->tryReceiveBack(placeOf(one))) {
           ASSERT_TRUE(held.emplace(back->data, *back).second);
         }
         break;

@@ -56,7 +56,7 @@ class MessageLinkTest : public ShmTest {
     EXPECT_TRUE(server_->hasMessage() && server_->tryBegin(envelope));
     if (MessageLink::isShort(envelope.body())) return server_->finishShort(envelope, {}, 0);
     const auto marks = envelope.marks();
-    return server_->finishLong(envelope.body(), {{}, marks.clientType, marks.clientExtra, 0},
+    return server_->finishLong(envelope.body(), {{}, marks.clientType(), marks.clientExtra(), 0},
                                finish_);
   }
   // The slot of the first request.
@@ -189,6 +189,22 @@ INSTANTIATE_TEST_SUITE_P(OfEachKind, InvalidEnvelopes,
                                            slot.slots = layout::kMaxMessageSlots + 1;
                                          },
                                          [](layout::Slot& slot) { slot.type = 0; }));
+
+class InvalidSides : public MessageLinkTest, public testing::WithParamInterface<std::uint32_t> {};
+
+TEST_P(InvalidSides, OfAChunkAreRefused) {
+  auto message = allocate(10'000);
+  ASSERT_TRUE(send(message) == LinkSend::sent || !message);
+  const auto side = GetParam();
+  std::memcpy(firstSlot().body.data() + offsetof(layout::ChunkRef, side), &side, sizeof side);
+
+  EXPECT_FALSE(take());
+
+  EXPECT_EQ(finish_, MessageLink::Finish::invalid);
+}
+// A client has no fan-out pool, and nobody has a pool of a side above.
+INSTANTIATE_TEST_SUITE_P(OfNoPool, InvalidSides,
+                         testing::Values(layout::kFanOutSide, layout::kFanOutSide + 1, UINT32_MAX));
 
 TEST_F(MessageLinkTest, ABodyOfAnotherTypeThanItsSizeIsAMessageThatIsNotSound) {
   Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::float64)};

@@ -31,8 +31,9 @@ class BulkReaderTest : public test::ShmTest {
     const auto chunk = owner_->tryAlloc(bytes);
     EXPECT_TRUE(chunk);
     std::memset(chunk->data, std::to_integer<int>(value), bytes);
-    owner_->lend(chunk->ref);
-    return chunk->ref;
+    const auto place = owner_->tryFind(chunk->data).value();
+    owner_->lend(place);
+    return {place.segment, place.chunk, 1, 0};
   }
   [[nodiscard]] std::string bulkPath() const {
     return segments::path(SegmentName::bulk(name(), kLink, 1, 0));
