@@ -48,6 +48,10 @@ ReplyResult MessageServer::reply(Message&& message) { return core_->replies().se
 RepliedMany MessageServer::replyMany(std::span<Message> replies) noexcept {
   return core_->replies().sendMany(replies);
 }
+RepliedMany MessageServer::replyBodies(const Message& request, MessageType type, std::size_t size,
+                                       std::span<const std::byte> bodies) noexcept {
+  return core_->replies().sendBodies(request, {type, size, bodies});
+}
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
   return ReplySender::allocate(request.route(), bytes);

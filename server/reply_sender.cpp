@@ -59,6 +59,54 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   return sent;
 }
 
+RepliedMany ReplySender::sendBodies(const Message& request, ReplyBodies bodies) noexcept {
+  const auto& route = request.route();
+  if (route.link == 0 || forkGuard_.isInherited()) return {0, ReplyResult::clientGone};
+  auto& connection = Connection::of(route);
+  const BiasedLock::Guard lock(*connection.lock);
+  if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
+  const Link::Batch batch(connection.channel->link());
+  RepliedMany sent;
+  // The first reply ends the request, so it goes the way of a message.
+  if (!bodies.all.empty() && connection.owes(route.requestId)) {
+    auto first = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
+    first.setRoute({route.link, route.requestId, route.flags, nullptr});
+    first.setClientType(request.getClientType());
+    first.setClientExtra(request.getClientExtra());
+    sent.result = sendLocked(connection, first);
+    if (sent.result != ReplyResult::sent) return sent;
+    sent.count = 1;
+    bodies.all = bodies.all.subspan(bodies.size);
+  }
+  sendFurtherLocked(connection, request, bodies, sent);
+  if (sent.count != 0) counts_.sent(sent.count);
+  return sent;
+}
+
+// Further replies to `request`, for which nothing but the body differs.
+void ReplySender::sendFurtherLocked(Connection& connection, const Message& request,
+                                    ReplyBodies bodies, RepliedMany& sent) noexcept {
+  auto& link = connection.channel->link();
+  Envelope envelope{
+      .type = static_cast<std::uint16_t>(bodies.type),
+      .requestId = request.route().requestId,
+      .clientType = request.getClientType(),
+      .clientExtra = request.getClientExtra(),
+      .timeNs = stamps_ ? Clock::wallNs() : 0,
+  };
+  for (; !bodies.all.empty(); bodies.all = bodies.all.subspan(bodies.size), ++sent.count) {
+    envelope.sentTick = Tick::ofSample(link.timeOfNext());
+    const auto result =
+        link.trySend(envelope, bodies.all.first(bodies.size), {0, link.slotsOfFirstReplies()});
+    if (result != LinkSend::sent) {
+      sent.result = noteRefused(result);
+      return;
+    }
+    MPF_STEP(reply_sent);
+    link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
+  }
+}
+
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendOneLocked(Connection& connection,
                                                                      Message& message) noexcept {
   if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
@@ -77,7 +125,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const auto timeNs = stamps_ && givenNs == 0 ? Clock::wallNs() : givenNs;
   const auto requestId = message.route().requestId;
   const bool isFirst = connection.owes(requestId);
-  const auto envelope = [&] {
+  const auto envelope = [&]() __attribute__((always_inline)) {
     return Envelope{
         .type = static_cast<std::uint16_t>(message.getType()),
         .flags = isFirst ? layout::kSlotFirstReply : std::uint8_t{0},

@@ -18,6 +18,13 @@
 
 namespace mpf {
 
+// Bodies of `size` bytes each, one after the other.
+struct ReplyBodies {
+  MessageType type;
+  std::size_t size;
+  std::span<const std::byte> all;
+};
+
 class ReplySender {
  public:
   //   stamps  give replies without a time stamp the time at which they are sent
@@ -25,8 +32,9 @@ class ReplySender {
 
   // MessageServer::reply().
   ReplyResult send(Message& message) noexcept;
-  // MessageServer::replyMany().
+  // MessageServer::replyMany(), of messages and of values.
   RepliedMany sendMany(std::span<Message> messages) noexcept;
+  RepliedMany sendBodies(const Message& request, ReplyBodies bodies) noexcept;
   // Ends a request of `connection` with a fate.
   void sendFate(Connection& connection, RequestMarks request, Fate fate) noexcept;
   // Ends a request whose handle was destroyed without a reply, with the fate `refused`.
@@ -39,6 +47,8 @@ class ReplySender {
   // Without data if the client has left, or its pool has no chunk.
   static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
+  void sendFurtherLocked(Connection& connection, const Message& request, ReplyBodies bodies,
+                         RepliedMany& sent) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
   // The caller counts what was sent.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;

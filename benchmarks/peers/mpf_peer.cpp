@@ -120,16 +120,13 @@ class MpfPeer final : public Peer {
     }
   }
   void sendBatch(MessageServer& server, const Message& request) {
-    for (auto& message : batch_) {
-      auto reply = server.allocReplyMessage<Int32>(request);
-      reply->value = ++value_;
-      message = std::move(reply);
-    }
-    for (std::span<Message> rest = batch_; !rest.empty();) {
-      rest = rest.subspan(server.replyMany(rest).count);
+    for (auto& value : batch_) value.value = ++value_;
+    for (std::span<const Int32> rest = batch_; !rest.empty();) {
+      const auto sent = server.replyMany(request, rest);
+      if (sent.result == ReplyResult::clientGone) throw std::runtime_error("the client is gone");
+      rest = rest.subspan(sent.count);
       if (!rest.empty()) cpuRelax();
     }
-    if (!server.isClientConnected(request)) throw std::runtime_error("the client is gone");
   }
   [[nodiscard]] ServerOptions optionsOfServer() const {
     auto options = serverOptions(options_.mode);
@@ -158,7 +155,7 @@ class MpfPeer final : public Peer {
   std::uint64_t received_ = 0;
   std::uint64_t awaited_ = 0;
   std::int32_t value_ = 0;
-  std::array<Message, kBatch> batch_;
+  std::array<Int32, kBatch> batch_;
 };
 
 }  // namespace

@@ -93,7 +93,7 @@ struct PeerFamily {
 };
 
 [[nodiscard]] PeerFamily mpfPeer();
-[[nodiscard]] PeerFamily mpfBatchPeer();  // replyMany(); for one-way traffic only
+[[nodiscard]] PeerFamily mpfBatchPeer();  // replyMany() of values; one-way traffic only
 [[nodiscard]] PeerFamily boostPeer();
 [[nodiscard]] PeerFamily socketPeer();
 [[nodiscard]] PeerFamily zeromqPeer();

@@ -73,7 +73,7 @@ enum class ReplyResult {
 
 // The result of MessageServer::replyMany().
 struct RepliedMany {
-  std::size_t count = 0;  // replies that were sent, or whose client is gone
+  std::size_t count = 0;  // replies that were sent; of messages also those whose client is gone
   ReplyResult result = ReplyResult::sent;  // why the next one was not sent; `sent` when all were
 };
 
@@ -145,6 +145,19 @@ class MessageServer {
   // another. Replies that were counted are empty then; the others are unchanged.
   // Any thread; never waits.
   RepliedMany replyMany(std::span<Message> replies) noexcept;
+  // Sends each of `values` as a reply to `request`, in order, until one is not sent: for a server
+  // that sends many numbers to a subscriber. Faster than a message for each of them.
+  //
+  //   server.replyMany<mpf::Int32>(subscriber, readings);  // std::vector<mpf::Int32> readings
+  //
+  // The first reply ends the request, as with reply(). A client that sleeps is woken once at most.
+  // Any thread; never waits.
+  //   request  stays with the caller, who can reply to it again
+  //   returns  the number of values that were sent; `result` is clientGone when the client is gone
+  template <ScalarBody T>
+  RepliedMany replyMany(const Message& request, std::span<const T> values) noexcept {
+    return replyBodies(request, T::kType, sizeof(T), std::as_bytes(values));
+  }
   // Ends a request without a reply: its client gets the fate `refused`.
   void refuse(Message&& request);
 
@@ -246,6 +259,9 @@ class MessageServer {
   friend class RelayServer;  // internal, for routers
   void setHandler(MessageType type, std::function<void(Message&&)> handler);
   void callHandler(const std::function<void(Message&&)>& handler, Message&& request);
+  // Bodies of `size` bytes each, one after the other.
+  RepliedMany replyBodies(const Message& request, MessageType type, std::size_t size,
+                          std::span<const std::byte> bodies) noexcept;
   BodyBytes allocate(const Message& request, std::size_t bytes);
   BodyBytes allocateShared(std::size_t bytes);
   static void address(Message& reply, const Message& request) noexcept {

@@ -43,8 +43,8 @@ std::int32_t MessageLink::cmdOfLong(BodyFields body) const noexcept {
   return cmd;
 }
 
-// This and readBody() are inline in finishLong(): a chunk or attributes that one function stores and
-// another one copies would wait for the stores.
+// This and readBody() are inline in finishLong(): copies of a chunk or of attributes that another
+// function has stored would wait for the stores.
 [[gnu::always_inline]] inline Message MessageLink::readChunk(BodyFields fields,
                                                              const Message::Attributes& attributes,
                                                              Finish& finish) {
