@@ -207,7 +207,7 @@ void growAt(Range& range, int file, const std::string& path) noexcept {
   range.inode.store(status.st_ino, std::memory_order_release);
 }
 
-bool isLost(const Range& range) noexcept { return range.lost.load(std::memory_order_relaxed); }
+const std::atomic<bool>& lossOf(const Range& range) noexcept { return range.lost; }
 
 bool tryRepair(const siginfo_t& fault) noexcept {
   if (fault.si_code != BUS_ADRERR) return false;

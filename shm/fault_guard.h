@@ -18,6 +18,7 @@
 
 #include <signal.h>
 
+#include <atomic>
 #include <cstddef>
 #include <string>
 
@@ -35,8 +36,9 @@ void remove(Range* range) noexcept;
 // part that was cut off contains zeroes afterwards.
 void growBy(Range& range, int file) noexcept;
 void growAt(Range& range, int file, const std::string& path) noexcept;
-// Whether the file was truncated and could not be grown: the memory is now private zeroes.
-[[nodiscard]] bool isLost(const Range& range) noexcept;
+// Whether the file was truncated and could not be grown: the memory is now private zeroes. A word
+// that exists as long as the process, because it is read for each message with a large body.
+[[nodiscard]] const std::atomic<bool>& lossOf(const Range& range) noexcept;
 
 // For a program that installs its own SIGBUS handler after its first MPF object. Returns true if
 // the fault was in a guarded range and is repaired: the handler returns. Async-signal-safe.

@@ -50,16 +50,20 @@ ipc::mapped_region mapRegion(int file, std::size_t bytes, Mapping::Access access
 
 Mapping::Mapping(int file, std::size_t bytes, Access access)
     : region_(mapRegion(file, bytes, access)),
-      range_(fault_guard::add(region_.get_address(), region_.get_size(),
-                              access != Access::readOnly)) {}
+      range_(
+          fault_guard::add(region_.get_address(), region_.get_size(), access != Access::readOnly)),
+      lost_(&fault_guard::lossOf(*range_)) {}
 
 Mapping::Mapping(Mapping&& other) noexcept
-    : region_(std::move(other.region_)), range_(std::exchange(other.range_, nullptr)) {}
+    : region_(std::move(other.region_)),
+      range_(std::exchange(other.range_, nullptr)),
+      lost_(std::exchange(other.lost_, nullptr)) {}
 
 Mapping& Mapping::operator=(Mapping&& other) noexcept {
   unguard();
   region_ = std::move(other.region_);
   range_ = std::exchange(other.range_, nullptr);
+  lost_ = std::exchange(other.lost_, nullptr);
   return *this;
 }
 

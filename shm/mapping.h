@@ -7,6 +7,7 @@
 //          replaces the memory by zeroes and isLost() is true (fault_guard.h).
 #pragma once
 
+#include <atomic>
 #include <boost/interprocess/mapped_region.hpp>
 #include <cstddef>
 #include <string>
@@ -36,7 +37,7 @@ class Mapping {
   }
   [[nodiscard]] std::size_t bytes() const noexcept { return region_.get_size(); }
   [[nodiscard]] bool isLost() const noexcept {
-    return range_ != nullptr && fault_guard::isLost(*range_);
+    return lost_ != nullptr && lost_->load(std::memory_order_relaxed);
   }
 
   // See fault_guard.h.
@@ -49,6 +50,7 @@ class Mapping {
   void unguard() noexcept;
   boost::interprocess::mapped_region region_;
   fault_guard::Range* range_ = nullptr;
+  const std::atomic<bool>* lost_ = nullptr;  // of range_
 };
 
 }  // namespace mpf

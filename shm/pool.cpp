@@ -48,7 +48,7 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
   for (int attempt = 0; attempt < 2; ++attempt) {
     for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
       auto& bulk = bulks_[segment];
-      if (bulk.chunkBytes != chunkBytes || bulk.free.empty()) continue;
+      if (bulk.chunkSize.bytes() != chunkBytes || bulk.free.empty()) continue;
       const auto index = bulk.free.back();
       bulk.free.pop_back();
       bulk.states[index] = ChunkState::held;
@@ -81,7 +81,10 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
   segment.closeFile();
   MPF_STEP(bulk_named);
   bytes_ += bytes;
-  Bulk bulk{std::move(segment), chunkBytes, std::vector<ChunkState>(count, ChunkState::free), {}};
+  Bulk bulk{std::move(segment),
+            ChunkSize(chunkBytes),
+            std::vector<ChunkState>(count, ChunkState::free),
+            {}};
   for (auto index = count; index-- > 0;) bulk.free.push_back(index);
   bulks_.push_back(std::move(bulk));
   return true;
@@ -121,7 +124,7 @@ bool PoolBorrower::tryMap(std::uint32_t number) try {
     return false;
   segment->closeFile();
   bytes_ += segment->bytes();
-  bulks_[number] = {std::move(*segment), header.chunkBytes, header.chunkCount};
+  bulks_[number] = {std::move(*segment), ChunkSize(header.chunkBytes), header.chunkCount};
   return true;
 } catch (const SegmentError&) {
   return false;

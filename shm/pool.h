@@ -51,6 +51,25 @@ struct PoolPlace {
   std::uint64_t ownerWindow{};
 };
 
+// The size of the chunks of a bulk segment.
+class ChunkSize {
+ public:
+  ChunkSize() noexcept = default;
+  explicit ChunkSize(std::uint64_t bytes) noexcept
+      : bytes_(bytes), inverse_(UINT64_MAX / bytes + 1) {}
+  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
+  // The chunk that contains this byte. A multiplication by 2^64 / bytes, because a division takes
+  // much longer; exact for the start of each chunk, and everywhere in the first 4 GiB.
+  [[nodiscard]] std::uint32_t chunkAt(std::uint64_t offset) const noexcept {
+    __extension__ using Product = unsigned __int128;
+    return static_cast<std::uint32_t>(Product{offset} * inverse_ >> 64);
+  }
+
+ private:
+  std::uint64_t bytes_ = 0;
+  std::uint64_t inverse_ = 0;
+};
+
 // The chunk of a pointer into one of these bulk segments.
 template <class Bulks>
 [[gnu::always_inline]] inline std::optional<ChunkPlace> tryFindIn(const Bulks& bulks,
@@ -60,8 +79,7 @@ template <class Bulks>
     if (!segment) continue;
     const auto offset = static_cast<std::size_t>(data - segment.data());
     if (offset < layout::kBulkChunksOffset || offset >= segment.bytes()) continue;
-    const auto chunk = (offset - layout::kBulkChunksOffset) / bulks[number].chunkBytes;
-    return ChunkPlace{number, static_cast<std::uint32_t>(chunk)};
+    return ChunkPlace{number, bulks[number].chunkSize.chunkAt(offset - layout::kBulkChunksOffset)};
   }
   return std::nullopt;
 }
@@ -85,7 +103,7 @@ class PoolOwner {
     auto& bulk = bulks_[place.segment];
     bulk.states[place.chunk] = ChunkState::held;
     MPF_STEP(chunk_back);
-    return Chunk{bulk.chunk(place.chunk), bulk.chunkBytes};
+    return Chunk{bulk.chunk(place.chunk), bulk.chunkSize.bytes()};
   }
   // Frees a chunk that is not lent.
   [[gnu::always_inline]] void free(ChunkPlace place) noexcept {
@@ -116,11 +134,11 @@ class PoolOwner {
   enum class ChunkState : std::uint8_t { free, held, lent };
   struct Bulk {
     Segment segment;
-    std::size_t chunkBytes{};
+    ChunkSize chunkSize;
     std::vector<ChunkState> states;
     std::vector<std::uint32_t> free;
     [[nodiscard]] std::byte* chunk(std::uint32_t index) const {
-      return segment.data() + layout::kBulkChunksOffset + index * chunkBytes;
+      return segment.data() + layout::kBulkChunksOffset + index * chunkSize.bytes();
     }
   };
   bool addBulk(std::size_t chunkBytes);
@@ -155,8 +173,8 @@ class PoolBorrower {
     if (!isMapped(place.segment)) return std::nullopt;
     const auto& bulk = bulks_[place.segment];
     if (place.chunk >= bulk.chunkCount || bulk.segment.isLost()) return std::nullopt;
-    return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + place.chunk * bulk.chunkBytes,
-                 bulk.chunkBytes};
+    const auto bytes = bulk.chunkSize.bytes();
+    return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + place.chunk * bytes, bytes};
   }
   // Returns a chunk to the peer, or one of its fan-out pool.
   void giveBack(ChunkPlace place) noexcept {
@@ -173,7 +191,7 @@ class PoolBorrower {
  private:
   struct Bulk {
     Segment segment;
-    std::size_t chunkBytes{};
+    ChunkSize chunkSize;
     std::uint32_t chunkCount{};
   };
   [[nodiscard]] bool isMapped(std::uint32_t number) const noexcept {

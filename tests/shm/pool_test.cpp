@@ -225,6 +225,17 @@ TEST_F(PoolTest, LendsNoMoreChunksThanTheReturnRingHolds) {
     ASSERT_TRUE(owner_->tryAlloc(100)) << "all chunks were returned: " << i;
 }
 
+TEST(ChunkSizeTest, FindsTheChunkOfEachByte) {
+  for (const std::uint64_t bytes : {640ull, 1152ull, (1ull << 20) + 128, (1ull << 24) + 128}) {
+    const ChunkSize size(bytes);
+    for (const std::uint32_t chunk : {0u, 1u, 2u, 7u, 31u}) {
+      EXPECT_EQ(size.chunkAt(chunk * bytes), chunk) << bytes;
+      EXPECT_EQ(size.chunkAt(chunk * bytes + bytes - 1), chunk) << bytes;
+    }
+  }
+  EXPECT_EQ(ChunkSize((1ull << 32) + 128).chunkAt(UINT32_MAX), 0u);
+}
+
 TEST_F(PoolTest, RecognizesPointersIntoItself) {
   const auto chunk = *owner_->tryAlloc(1000);
   owner_->lend(placeOf(chunk));
