@@ -67,7 +67,7 @@ RepliedMany ReplySender::sendBodies(const Message& request, ReplyBodies bodies) 
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   const Link::Batch batch(connection.channel->link());
   RepliedMany sent;
-  // The first reply ends the request, so it goes the way of a message.
+  // The first reply ends the request. sendLocked() does that, for a message.
   if (!bodies.all.empty() && connection.owes(route.requestId)) {
     auto first = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
     first.setRoute({route.link, route.requestId, route.flags, nullptr});
@@ -83,7 +83,7 @@ RepliedMany ReplySender::sendBodies(const Message& request, ReplyBodies bodies) 
   return sent;
 }
 
-// Further replies to `request`, for which nothing but the body differs.
+// Sends further replies to `request`. Only their bodies and ticks differ.
 void ReplySender::sendFurtherLocked(Connection& connection, const Message& request,
                                     ReplyBodies bodies, RepliedMany& sent) noexcept {
   auto& link = connection.channel->link();

@@ -39,9 +39,10 @@ struct BodyFields {
   std::uint32_t bodyBytes{};
 };
 
-// The part of an envelope that a reply copies from its request. Two numbers of 32 bits would go
-// through memory on their way into one register, so they are joined.
+// The part of an envelope that a reply copies from its request.
 struct RequestMarks {
+  // clientType, and in the upper half clientExtra: as two numbers they would go through memory on
+  // their way into one register
   std::uint64_t ofClient{};
   std::uint32_t requestId{};
 

@@ -4,7 +4,7 @@
 //
 //   access beyond the end of the file ─► SIGBUS ─► handler:
 //     in a guarded mapping whose file can be grown   grow the file, repeat the access
-//     in another guarded mapping                     map zeroes in its place; isLost() is now true
+//     in another guarded mapping                     map zeroes in its place; lossOf() is now true
 //     elsewhere                                      call the handler that was installed before
 //
 // In the child of a fork, all guarded mappings are replaced by zeroes, and the child gives up its
@@ -36,8 +36,9 @@ void remove(Range* range) noexcept;
 // part that was cut off contains zeroes afterwards.
 void growBy(Range& range, int file) noexcept;
 void growAt(Range& range, int file, const std::string& path) noexcept;
-// Whether the file was truncated and could not be grown: the memory is now private zeroes. A word
-// that exists as long as the process, because it is read for each message with a large body.
+// True once the file was truncated and could not be grown: the memory is then private zeroes. A
+// reference, so that each message with a large body reads it without a call. It says nothing after
+// remove().
 [[nodiscard]] const std::atomic<bool>& lossOf(const Range& range) noexcept;
 
 // For a program that installs its own SIGBUS handler after its first MPF object. Returns true if

@@ -263,8 +263,8 @@ inline constexpr std::size_t kCmdOffset = 4;
 // executes a barrier in all processes, and then looks for messages once more.
 enum class Watch : std::uint32_t { polled = 0, unwatched = 1, polledUnfenced = 2 };
 
-// How far a ring's consumer is. `freed` has lines of its own: a producer that waits for room reads
-// it again and again, and each message that the consumer takes would wait for the line.
+// How far a ring's consumer is. `freed` has a line of its own: a producer that waits for room reads
+// it again and again, and on a shared line each store to `taken` would wait.
 struct RingControl {
   alignas(kPairBytes) Word64 freed;  // slots before this position may be overwritten
   // messages taken so far; the consumer has not looked at a message that is not counted here
@@ -298,14 +298,14 @@ struct LinkControl {
   // does not say where. Only the speed depends on it.
   Word32 requestsPolledOn;  // server
   Word32 repliesPolledOn;  // client
-  // The client writes these words for each message, but for replies.freed. The server seldom reads
-  // them.
+  // Written by the client, most of them for each message. The server seldom reads them, except
+  // replies.freed.
   RingControl replies;
   Word64 clientSent;
   Word64 clientRefused;  // sends refused: queue full, too many unanswered, too large, no memory
   Word64 clientAnswered;  // requests that have had a reply or a fate
-  // The server writes these words for each message, but for requests.freed. The client seldom reads
-  // them.
+  // Written by the server, most of them for each message. The client seldom reads them, except
+  // requests.freed.
   alignas(kPairBytes) RingControl requests;
   Word64 serverSent;
   // 1 + the position of the first reply in the second reply ring; 0: all are in the first one

@@ -372,7 +372,7 @@ std::optional<Chunk> Link::tryBorrowOther(layout::ChunkRef ref) try {
   }
   if (!chunk && hasPeerEnded()) throw ChunkUnavailable();
   return chunk;
-} catch (const std::exception&) {  // also: no descriptor or no memory
+} catch (const std::exception&) {  // ChunkUnavailable from above, no descriptor, or no memory
   if (ref.side == layout::kFanOutSide) borrowed_.giveBackFanOut(ref.segment);
   else borrowed_.giveBack({ref.segment, ref.chunk});
   throw ChunkUnavailable();

@@ -283,8 +283,8 @@ class Link {
     }
     return tryBorrowOther(ref);
   }
-  // Of a chunk that is not mapped yet, is in the fan-out pool, or does not exist. A copy, so that
-  // the caller has its own in registers.
+  // tryBorrow() of a chunk that is not mapped yet, is in the fan-out pool, or does not exist. `ref`
+  // is a copy, so that the caller's stays in registers.
   std::optional<Chunk> tryBorrowOther(layout::ChunkRef ref);
   [[nodiscard]] std::uint32_t peerSide() const noexcept {
     return 1 - static_cast<std::uint32_t>(side_);

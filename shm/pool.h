@@ -30,8 +30,7 @@ namespace mpf {
 struct Chunk {
   std::byte* data{};
   std::size_t capacity{};
-  // Of a chunk that a client received from the fan-out pool of its server:
-  bool isFanOut = false;
+  bool isFanOut = false;  // a client received it from the server's fan-out pool
   std::uint32_t missed = 0;  // as in layout::ChunkRef
 };
 // The position of a chunk in a pool. Functions on the path of a message that take or return one are
@@ -58,8 +57,9 @@ class ChunkSize {
   explicit ChunkSize(std::uint64_t bytes) noexcept
       : bytes_(bytes), inverse_(UINT64_MAX / bytes + 1) {}
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
-  // The chunk that contains this byte. A multiplication by 2^64 / bytes, because a division takes
-  // much longer; exact for the start of each chunk, and everywhere in the first 4 GiB.
+  // The chunk that contains the byte at `offset` from the first chunk. Multiplies by 2^64 / bytes,
+  // because a division takes much longer; exact for the start of each chunk, and everywhere in the
+  // first 4 GiB.
   [[nodiscard]] std::uint32_t chunkAt(std::uint64_t offset) const noexcept {
     __extension__ using Product = unsigned __int128;
     return static_cast<std::uint32_t>(Product{offset} * inverse_ >> 64);
@@ -168,7 +168,7 @@ class PoolBorrower {
   // Maps a chunk that the peer sent; nullopt if there is no such chunk.
   //   throws  std::system_error, std::bad_alloc: no free descriptor or no memory to map it
   std::optional<Chunk> tryBorrow(ChunkPlace place);
-  // The same for a chunk whose segment is mapped already; nullopt for every other one.
+  // As tryBorrow(), but maps nothing: nullopt if the segment is not mapped.
   [[gnu::always_inline]] std::optional<Chunk> tryBorrowMapped(ChunkPlace place) noexcept {
     if (!isMapped(place.segment)) return std::nullopt;
     const auto& bulk = bulks_[place.segment];
@@ -176,7 +176,7 @@ class PoolBorrower {
     const auto bytes = bulk.chunkSize.bytes();
     return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + place.chunk * bytes, bytes};
   }
-  // Returns a chunk to the peer, or one of its fan-out pool.
+  // Return a chunk to the peer's pool, or to its fan-out pool.
   void giveBack(ChunkPlace place) noexcept {
     returnPacked(place.segment * layout::kMaxChunks + place.chunk % layout::kMaxChunks);
   }

@@ -336,8 +336,8 @@ class Message {
     }
   };
 
-  // For attributes that were written just before, and not in the function that copies them: see
-  // copy_words.h.
+  // Loads each attribute by itself: a wider load would wait for stores that another function has
+  // just made (copy_words.h).
   static Attributes inRegisters(const Attributes& all) noexcept {
     using detail::alone;
     return {{alone(all.route.link), alone(all.route.requestId), alone(all.route.flags),

@@ -13,8 +13,9 @@
 //     while (mpf::Message request = server.receive()) { ...; server.reply(std::move(request)); }
 //   }
 //
-// Threads  one thread waits and receives; any thread may call reply(), allocReplyMessage(),
-//          allocShared(), publish(), isClientConnected(), countAlarm() and interrupt().
+// Threads  one thread waits and receives; any thread may call reply(), replyMany(),
+//          allocReplyMessage(), allocShared(), publish(), isClientConnected(), countAlarm() and
+//          interrupt().
 // Crash    when a client dies, the handles of its requests stay valid; replies to them return
 //          clientGone. Its shared memory is freed when the last of these handles is destroyed;
 //          published messages that it held are freed at once.
@@ -73,7 +74,7 @@ enum class ReplyResult {
 
 // The result of MessageServer::replyMany().
 struct RepliedMany {
-  std::size_t count = 0;  // replies that were sent; of messages also those whose client is gone
+  std::size_t count = 0;  // replies sent; with messages, also those whose client is gone
   ReplyResult result = ReplyResult::sent;  // why the next one was not sent; `sent` when all were
 };
 
@@ -153,6 +154,7 @@ class MessageServer {
   // The first reply ends the request, as with reply(). A client that sleeps is woken once at most.
   // Any thread; never waits.
   //   request  stays with the caller, who can reply to it again
+  //   values   with ServerOptions::stampsReplies, all but the first get the same time stamp
   //   returns  the number of values that were sent; `result` is clientGone when the client is gone
   template <ScalarBody T>
   RepliedMany replyMany(const Message& request, std::span<const T> values) noexcept {

@@ -15,7 +15,7 @@ namespace mpf::python {
 // "spin", "adaptive" or "block". Throws std::invalid_argument for other words.
 [[nodiscard]] WaitMode waitModeOf(const std::string& word);
 
-// A wait looks for signals at this interval: a signal handler of Python runs at most this late.
+// Interval at which a wait looks for signals: the longest delay of a signal handler of Python.
 inline constexpr std::chrono::milliseconds kLookForSignals{100};
 
 // Differs between a process and the children that it forks.
