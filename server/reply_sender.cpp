@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/reply_sender.h"
 
+#include <algorithm>
 #include <memory>
 
 #include <mpf/clock.h>
@@ -60,6 +61,18 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
 }
 
 RepliedMany ReplySender::sendBodies(const Message& request, ReplyBodies bodies) noexcept {
+  constexpr std::size_t kMaxRun = 1024;  // other threads may wait for the lock
+  RepliedMany sent;
+  while (!bodies.all.empty() && sent.result == ReplyResult::sent) {
+    const auto bytes = std::min(bodies.all.size(), kMaxRun * bodies.size);
+    const auto run = sendRun(request, {bodies.type, bodies.size, bodies.all.first(bytes)});
+    sent = {sent.count + run.count, run.result};
+    bodies.all = bodies.all.subspan(bytes);
+  }
+  return sent;
+}
+
+RepliedMany ReplySender::sendRun(const Message& request, ReplyBodies bodies) noexcept {
   const auto& route = request.route();
   if (route.link == 0 || forkGuard_.isInherited()) return {0, ReplyResult::clientGone};
   auto& connection = Connection::of(route);
@@ -67,25 +80,27 @@ RepliedMany ReplySender::sendBodies(const Message& request, ReplyBodies bodies) 
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   const Link::Batch batch(connection.channel->link());
   RepliedMany sent;
-  // The first reply ends the request. sendLocked() does that, for a message.
-  if (!bodies.all.empty() && connection.owes(route.requestId)) {
-    auto first = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
-    first.setRoute({route.link, route.requestId, route.flags, nullptr});
-    first.setClientType(request.getClientType());
-    first.setClientExtra(request.getClientExtra());
-    sent.result = sendLocked(connection, first);
-    if (sent.result != ReplyResult::sent) return sent;
-    sent.count = 1;
+  // As messages: the first reply, which ends the request, and bodies that do not fit into a slot.
+  // Such a body could be sent in place, if it lay in a chunk, which belongs to the caller.
+  while (!bodies.all.empty() && sent.result == ReplyResult::sent &&
+         (bodies.size > layout::kFirstSlotBodyBytes || connection.owes(route.requestId))) {
+    auto message = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
+    message.setRoute({route.link, route.requestId, route.flags, nullptr});
+    message.setClientType(request.getClientType());
+    message.setClientExtra(request.getClientExtra());
+    sent.result = sendLocked(connection, message);
+    if (sent.result != ReplyResult::sent) break;
+    ++sent.count;
     bodies.all = bodies.all.subspan(bodies.size);
   }
-  sendFurtherLocked(connection, request, bodies, sent);
+  if (sent.result == ReplyResult::sent) sendShortLocked(connection, request, bodies, sent);
   if (sent.count != 0) counts_.sent(sent.count);
   return sent;
 }
 
-// Sends further replies to `request`. Only their bodies and ticks differ.
-void ReplySender::sendFurtherLocked(Connection& connection, const Message& request,
-                                    ReplyBodies bodies, RepliedMany& sent) noexcept {
+// Sends further replies to `request`, whose bodies fit into a slot. Only bodies and ticks differ.
+void ReplySender::sendShortLocked(Connection& connection, const Message& request,
+                                  ReplyBodies bodies, RepliedMany& sent) noexcept {
   auto& link = connection.channel->link();
   Envelope envelope{
       .type = static_cast<std::uint16_t>(bodies.type),

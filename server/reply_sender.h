@@ -47,8 +47,9 @@ class ReplySender {
   // Without data if the client has left, or its pool has no chunk.
   static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
-  void sendFurtherLocked(Connection& connection, const Message& request, ReplyBodies bodies,
-                         RepliedMany& sent) noexcept;
+  RepliedMany sendRun(const Message& request, ReplyBodies bodies) noexcept;
+  void sendShortLocked(Connection& connection, const Message& request, ReplyBodies bodies,
+                       RepliedMany& sent) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
   // The caller counts what was sent.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;

@@ -77,7 +77,8 @@ template <class Bulks>
   for (std::uint32_t number = 0; number < bulks.size(); ++number) {
     const auto& segment = bulks[number].segment;
     if (!segment) continue;
-    const auto offset = static_cast<std::size_t>(data - segment.data());
+    const auto offset =
+        reinterpret_cast<std::uintptr_t>(data) - reinterpret_cast<std::uintptr_t>(segment.data());
     if (offset < layout::kBulkChunksOffset || offset >= segment.bytes()) continue;
     return ChunkPlace{number, bulks[number].chunkSize.chunkAt(offset - layout::kBulkChunksOffset)};
   }

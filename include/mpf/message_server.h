@@ -151,13 +151,14 @@ class MessageServer {
   //
   //   server.replyMany<mpf::Int32>(subscriber, readings);  // std::vector<mpf::Int32> readings
   //
-  // The first reply ends the request, as with reply(). A client that sleeps is woken once at most.
-  // Any thread; never waits.
+  // The first reply ends the request, as with reply(). A client that sleeps is woken once for up to
+  // 1024 values. Any thread; never waits.
   //   request  stays with the caller, who can reply to it again
-  //   values   with ServerOptions::stampsReplies, all but the first get the same time stamp
+  //   values   with ServerOptions::stampsReplies, many of them get the same time stamp
   //   returns  the number of values that were sent; `result` is clientGone when the client is gone
   template <ScalarBody T>
   RepliedMany replyMany(const Message& request, std::span<const T> values) noexcept {
+    static_assert(sizeof(T) <= Message::kInlineBytes);
     return replyBodies(request, T::kType, sizeof(T), std::as_bytes(values));
   }
   // Ends a request without a reply: its client gets the fate `refused`.
