@@ -82,7 +82,7 @@ RepliedMany ReplySender::sendRun(const Message& request, ReplyBodies bodies) noe
   RepliedMany sent;
   // As messages: the first reply, which ends the request, and bodies that do not fit into a slot.
   // Such a body could be sent in place, if it lay in a chunk, which belongs to the caller.
-  while (!bodies.all.empty() && sent.result == ReplyResult::sent &&
+  while (!bodies.all.empty() &&
          (bodies.size > layout::kFirstSlotBodyBytes || connection.owes(route.requestId))) {
     auto message = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
     message.setRoute({route.link, route.requestId, route.flags, nullptr});

@@ -107,6 +107,18 @@ TEST_F(ReplyManyValues, StopAtAFullRing) {
   EXPECT_EQ(sent.result, ReplyResult::sent) << "none was left";
 }
 
+// The lock of the connection is released after each 1024.
+TEST_F(ReplyManyValues, OfManyRunsArriveInOrder) {
+  startServer({.queueSize = 8192});
+  const auto request = heldRequest();
+
+  const auto sent = server_->replyMany<Int32>(request, readings(3000));
+
+  ASSERT_EQ(sent.count, 3000u);
+  EXPECT_EQ(sent.result, ReplyResult::sent);
+  for (std::int32_t i = 0; i < 3000; ++i) ASSERT_EQ(valueOf(next()), i);
+}
+
 TEST_F(ReplyManyValues, StopWhenTheClientIsGone) {
   startServer();
   Message request;
