@@ -34,6 +34,12 @@ void Binding::setServer(const std::string& server, std::int32_t location) {
                                  std::memory_order_relaxed);
 }
 
+void Binding::setValueHandler(ValueHandler handler) {
+  if (state() != BindingState::unbound)
+    throw std::logic_error("MessageClient::onValues(): the client is bound already");
+  values_ = std::move(handler);
+}
+
 void Binding::tryConnect() try {
   // Another thread in bind(), or a callback that ran the dispatcher, may have connected already.
   if (!isWaiting()) return;

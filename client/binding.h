@@ -24,6 +24,7 @@
 #include "client/dispatcher_parts.h"
 #include "client/nudge_interval.h"
 #include "client/request_sender.h"
+#include "client/value_handler.h"
 
 namespace mpf {
 
@@ -53,6 +54,8 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   }
   //   throws  as Connector::setServer()
   void setServer(const std::string& server, std::int32_t location);
+  //   throws  std::logic_error after setServer()
+  void setValueHandler(ValueHandler handler);
   bool waitConnected(Deadline deadline) {
     return connector_.wait(deadline, [this] { return isConnected(); });
   }
@@ -136,6 +139,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   Control prepareControl(Message& message, Request* request);
   void noteTimes(std::uint32_t sentTick, const Request* request) noexcept;
   void deliver(Message&& message);
+  void deliverValues(const Message& first);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   void deliverFate(const UntakenRequest& request, Fate fate);
@@ -158,6 +162,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   Connector connector_{parts_, timer_};
   NudgeInterval nudgeInterval_;
   bool isPaused_ = false;
+  ValueHandler values_;  // written before bind()
   End end_;  // in the states ending and interrupted, and at the end in the state left
 };
 

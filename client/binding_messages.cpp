@@ -37,7 +37,7 @@ bool Binding::takeSome(int most) {
 }
 
 // Delivers the messages that the server sent before it closed the link or died. A server that is
-// still alive could send without end, so at most one ring of messages is delivered.
+// still alive could send without end, so no more calls are made than a ring has messages.
 void Binding::deliverRemaining(const MessageLink* ended) {
   while (sender_.channel().get() == ended && end_.remainingSlots != 0) {
     --end_.remainingSlots;
@@ -143,10 +143,39 @@ void Binding::noteTimes(std::uint32_t sentTick, const Request* request) noexcept
 
 // The callback may throw: callers have finished all other work on the message before.
 void Binding::deliver(Message&& message) try {
-  if (!hasLeft()) callback_(std::move(message));
+  if (hasLeft()) return;
+  if (message.getType() == values_.type && message.isSound()) {
+    deliverValues(message);
+  } else {
+    callback_(std::move(message));
+  }
 } catch (...) {
   parts_.errors.note(connector_.server(), connector_.location());
   throw;
+}
+
+// Takes with a value those that follow it in the ring, if they fill a slot each. Not inline, so that
+// deliver() stays small.
+[[gnu::noinline]] void Binding::deliverValues(const Message& first) {
+  if (first.body().size() != layout::kFirstSlotBodyBytes || values_.size != first.body().size())
+    return values_.callback(first.body().first(values_.size), first);
+  const Envelope like{.type = static_cast<std::uint16_t>(first.getType()),
+                      .bodyBytes = layout::kFirstSlotBodyBytes,
+                      .requestId = first.route().requestId,
+                      .clientType = first.getClientType(),
+                      .clientExtra = first.getClientExtra(),
+                      .timeNs = first.getTimeStampNs()};
+  ValueRun run;
+  run.add(FirstBody::of(first.body().data()));
+  std::uint32_t sentTick = 0;
+  const auto taken = channel().link().incoming().takeLike(
+      like, ValueRun::kMost - 1, [&](const FirstBody& body, std::uint32_t tick) {
+        run.add(body);
+        if (tick != 0) sentTick = tick;
+      });
+  count(control().received, taken);
+  if (sentTick != 0) noteTimes(sentTick, nullptr);
+  values_.callback(run.all(), first);
 }
 
 }  // namespace mpf

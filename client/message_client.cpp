@@ -59,6 +59,12 @@ void MessageClient::bind(const std::string& server, std::int32_t location) {
   dispatcher_->commands().runOrPost([binding = binding_] { binding->tryConnect(); });
 }
 
+void MessageClient::setValueHandler(
+    MessageType type, std::size_t size,
+    std::function<void(std::span<const std::byte> values, const Message& first)> callback) {
+  binding_->setValueHandler({type, size, std::move(callback)});
+}
+
 SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId,
                                Retry retry) noexcept {
   if (isInherited()) return SendResult::notConnected;

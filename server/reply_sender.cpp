@@ -80,10 +80,11 @@ RepliedMany ReplySender::sendRun(const Message& request, ReplyBodies bodies) noe
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   const Link::Batch batch(connection.channel->link());
   RepliedMany sent;
-  // As messages: the first reply, which ends the request, and bodies that do not fit into a slot.
-  // Such a body could be sent in place, if it lay in a chunk, which belongs to the caller.
-  while (!bodies.all.empty() &&
-         (bodies.size > layout::kFirstSlotBodyBytes || connection.owes(route.requestId))) {
+  const bool fillsSlot = bodies.size == layout::kFirstSlotBodyBytes &&
+                         bodies.size <= connection.channel->link().maxMessageBytes();
+  // As messages: the first reply, which ends the request, and bodies of other lengths. Such a body
+  // could be sent in place, if it lay in a chunk, which belongs to the caller.
+  while (!bodies.all.empty() && (!fillsSlot || connection.owes(route.requestId))) {
     auto message = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
     message.setRoute({route.link, route.requestId, route.flags, nullptr});
     message.setClientType(request.getClientType());
@@ -93,14 +94,14 @@ RepliedMany ReplySender::sendRun(const Message& request, ReplyBodies bodies) noe
     ++sent.count;
     bodies.all = bodies.all.subspan(bodies.size);
   }
-  if (sent.result == ReplyResult::sent) sendShortLocked(connection, request, bodies, sent);
+  if (sent.result == ReplyResult::sent) sendFullSlotsLocked(connection, request, bodies, sent);
   if (sent.count != 0) counts_.sent(sent.count);
   return sent;
 }
 
-// Sends further replies to `request`, whose bodies fit into a slot. Only bodies and ticks differ.
-void ReplySender::sendShortLocked(Connection& connection, const Message& request,
-                                  ReplyBodies bodies, RepliedMany& sent) noexcept {
+// Sends further replies to `request`, whose bodies fill a slot.
+void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& request,
+                                      ReplyBodies bodies, RepliedMany& sent) noexcept {
   auto& link = connection.channel->link();
   Envelope envelope{
       .type = static_cast<std::uint16_t>(bodies.type),
@@ -109,16 +110,16 @@ void ReplySender::sendShortLocked(Connection& connection, const Message& request
       .clientExtra = request.getClientExtra(),
       .timeNs = stamps_ ? Clock::wallNs() : 0,
   };
-  for (; !bodies.all.empty(); bodies.all = bodies.all.subspan(bodies.size), ++sent.count) {
-    envelope.sentTick = Tick::ofSample(link.timeOfNext());
-    const auto result =
-        link.trySend(envelope, bodies.all.first(bodies.size), {0, link.slotsOfFirstReplies()});
-    if (result != LinkSend::sent) {
-      sent.result = noteRefused(result);
+  while (!bodies.all.empty()) {
+    const auto count = link.trySendRun(envelope, bodies.all, link.slotsOfFirstReplies());
+    if (count == 0) {
+      sent.result = noteRefused(LinkSend::full);
       return;
     }
     MPF_STEP(reply_sent);
     link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
+    sent.count += count;
+    bodies.all = bodies.all.subspan(count * bodies.size);
   }
 }
 

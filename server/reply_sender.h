@@ -48,8 +48,8 @@ class ReplySender {
   static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   RepliedMany sendRun(const Message& request, ReplyBodies bodies) noexcept;
-  void sendShortLocked(Connection& connection, const Message& request, ReplyBodies bodies,
-                       RepliedMany& sent) noexcept;
+  void sendFullSlotsLocked(Connection& connection, const Message& request, ReplyBodies bodies,
+                           RepliedMany& sent) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
   // The caller counts what was sent.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;

@@ -74,6 +74,39 @@ struct Envelope {
   }
 };
 
+// An envelope as a first slot holds it. In words of 64 bits, because the number of stores limits
+// the rate of messages.
+struct EnvelopeWords {
+  std::uint64_t body, request, client, timeNs;
+
+  // `slots`: of the message; `bodyBytes` replaces that of the envelope.
+  [[nodiscard, gnu::always_inline]] static EnvelopeWords of(const Envelope& envelope,
+                                                            std::uint32_t slots,
+                                                            std::uint32_t bodyBytes) noexcept {
+    using detail::joined;
+    static_assert(offsetof(layout::Slot, slots) == offsetof(layout::Slot, type) + 2 &&
+                  offsetof(layout::Slot, flags) == offsetof(layout::Slot, type) + 3 &&
+                  offsetof(layout::Slot, bodyBytes) == offsetof(layout::Slot, type) + 4 &&
+                  offsetof(layout::Slot, clientType) == offsetof(layout::Slot, requestId) + 4 &&
+                  offsetof(layout::Slot, sentTick) == offsetof(layout::Slot, clientExtra) + 4);
+    return {
+        joined(joined(envelope.type, static_cast<std::uint8_t>(slots), envelope.flags), bodyBytes),
+        joined(envelope.requestId, static_cast<std::uint32_t>(envelope.clientType)),
+        clientWord(envelope, envelope.sentTick), static_cast<std::uint64_t>(envelope.timeNs)};
+  }
+  [[nodiscard, gnu::always_inline]] static std::uint64_t clientWord(const Envelope& envelope,
+                                                                    std::uint32_t tick) noexcept {
+    return detail::joined(static_cast<std::uint32_t>(envelope.clientExtra), tick);
+  }
+  [[gnu::always_inline]] void copyTo(layout::Slot& first) const noexcept {
+    auto* const slot = reinterpret_cast<std::byte*>(&first);
+    std::memcpy(slot + offsetof(layout::Slot, type), &body, sizeof body);
+    std::memcpy(slot + offsetof(layout::Slot, requestId), &request, sizeof request);
+    std::memcpy(slot + offsetof(layout::Slot, clientExtra), &client, sizeof client);
+    std::memcpy(slot + offsetof(layout::Slot, deadlineNs), &timeNs, sizeof timeNs);
+  }
+};
+
 // A copy of the body bytes in a first slot, in words that the compiler keeps in registers.
 struct FirstBody {
   std::uint64_t first, second, third;

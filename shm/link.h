@@ -159,6 +159,17 @@ class Link {
                    Limits limits) noexcept {
     return trySend([&]() -> const Envelope& { return envelope; }, body, limits);
   }
+  // Sends messages that differ only in their bodies, which fill a slot each and lie one after the
+  // other. Sets the tick of the envelope. Returns how many were sent, perhaps not as many as fit;
+  // 0: the ring is full.
+  std::size_t trySendRun(Envelope& envelope, std::span<const std::byte> bodies,
+                         std::uint32_t reserve) noexcept {
+    envelope.sentTick = Tick::ofSample(timeOfNext());
+    const auto count =
+        out_.pushRun(envelope, bodies.data(), bodies.size() / layout::kFirstSlotBodyBytes, reserve);
+    if (count != 0) afterPush();
+    return count;
+  }
   // While it exists, messages are sent without a notice to the peer; at its end, one notice stands
   // for all of them.
   class Batch {

@@ -71,7 +71,7 @@ class RingProducer {
     const auto count = slotsFor(body.size());
     if (!hasFree(count + reserve)) return false;
     auto& first = next();
-    write(first, envelope, count, envelope.bodyBytes);
+    EnvelopeWords::of(envelope, count, envelope.bodyBytes).copyTo(first);
     copyBody(first, body);
     publish(first, count);
     return true;
@@ -86,7 +86,7 @@ class RingProducer {
     if (!hasFree(1 + reserve)) return false;
     if (pushed_ >= claimed_) claimLines();
     auto& first = next();
-    write(first, envelope(), 1, bodyBytes);
+    EnvelopeWords::of(envelope(), 1, bodyBytes).copyTo(first);
     if (body.size() == layout::kFirstSlotBodyBytes) [[likely]]
       detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     else if (!body.empty()) std::memcpy(first.body.data(), body.data(), body.size());
@@ -95,6 +95,33 @@ class RingProducer {
     // time.
     if (isPolledElsewhere_ && reserve == 0) lines::offer(&first);
     return true;
+  }
+  // Pushes up to `most` messages that differ only in their bodies, which fill a slot each and lie
+  // one after the other in `bodies`, until fewer than `reserve` free slots would remain or the next
+  // lines are to be claimed. Only the first message has the tick. Returns the number of messages.
+  [[nodiscard]] std::size_t pushRun(const Envelope& envelope, const std::byte* bodies,
+                                    std::size_t most, std::uint32_t reserve) noexcept {
+    if (!hasFree(1 + reserve)) return 0;
+    if (pushed_ >= claimed_) claimLines();
+    const auto count = std::min({most, freeEnd_ - reserve - pushed_, claimed_ - pushed_});
+    auto words = EnvelopeWords::of(envelope, 1, layout::kFirstSlotBodyBytes);
+    const auto untimed = EnvelopeWords::clientWord(envelope, 0);
+    auto position = pushed_;
+    for (const auto end = pushed_ + count; position != end;) {
+      auto& message = slot(position);
+      words.copyTo(message);
+      words.client = untimed;
+      detail::copyWords<layout::kFirstSlotBodyBytes>(message.body.data(), bodies);
+      bodies += layout::kFirstSlotBodyBytes;
+      MPF_STEP(slot_written);
+      // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
+      message.sequence.store(++position, std::memory_order_release);
+      MPF_STEP(slot_published);
+    }
+    pushed_ = position;
+    messages_ += count;
+    next_.store(&slot(pushed_), std::memory_order_relaxed);
+    return count;
   }
   // Whether the consumer polled the ring on another processor, at the last claim.
   [[nodiscard]] bool isPolledElsewhere() const noexcept { return isPolledElsewhere_; }
@@ -179,24 +206,6 @@ class RingProducer {
       lines::claim(slot(position).type);
   }
 
-  // In words of 64 bits, because the number of stores limits the rate of messages.
-  [[gnu::always_inline]] static void write(layout::Slot& first, const Envelope& envelope,
-                                           std::uint32_t slots, std::uint32_t bodyBytes) noexcept {
-    using detail::joined;
-    auto* const slot = reinterpret_cast<std::byte*>(&first);
-    const auto put = [&](auto at, std::uint64_t word) { std::memcpy(slot + at, &word, 8); };
-    static_assert(offsetof(layout::Slot, type) == 8 && offsetof(layout::Slot, slots) == 10 &&
-                  offsetof(layout::Slot, flags) == 11 && offsetof(layout::Slot, bodyBytes) == 12 &&
-                  offsetof(layout::Slot, clientType) == offsetof(layout::Slot, requestId) + 4 &&
-                  offsetof(layout::Slot, sentTick) == offsetof(layout::Slot, clientExtra) + 4);
-    put(offsetof(layout::Slot, type),
-        joined(joined(envelope.type, static_cast<std::uint8_t>(slots), envelope.flags), bodyBytes));
-    put(offsetof(layout::Slot, requestId),
-        joined(envelope.requestId, static_cast<std::uint32_t>(envelope.clientType)));
-    put(offsetof(layout::Slot, clientExtra),
-        joined(static_cast<std::uint32_t>(envelope.clientExtra), envelope.sentTick));
-    first.deadlineNs = envelope.timeNs;
-  }
   [[gnu::always_inline]] void publish(layout::Slot& first, std::uint32_t slots) noexcept {
     MPF_STEP(slot_written);
     const auto sequence = pushed_ + 1;

@@ -110,6 +110,24 @@ class RingConsumer {
   }
   // The same if hasOneSlot().
   void endOneSlot() noexcept { end(1); }
+  // Takes messages that follow the one that was ended last, as many as are there, at most `most`
+  // and to the end of the batch: those of one slot that differ from `like` only in body and tick.
+  // Calls `take(body, sentTick)` for each; returns their number.
+  template <class Take>
+  std::uint64_t takeLike(const Envelope& like, std::uint64_t most, const Take& take) noexcept {
+    const auto count = countLike(like, std::min(most, batchEnd_ - taken_));
+    if (count == 0) return 0;
+    messages_ += count;
+    // PAIR(message-taken): stored before we look at the bodies.
+    own_.taken.store(messages_, std::memory_order_release);
+    MPF_STEP(message_counted);
+    for (auto position = taken_; position < taken_ + count; ++position) {
+      const auto& each = slot(position);
+      take(FirstBody::of(each.body.data()), each.sentTick);
+    }
+    end(count);
+    return count;
+  }
   // The owner has found no message: frees all slots that were taken, and begins a new batch.
   void onEmpty() noexcept {
     if (taken_ != freed_) free();
@@ -151,7 +169,27 @@ class RingConsumer {
     return true;
   }
 
-  void end(std::uint32_t slots) noexcept {
+  [[nodiscard]] std::uint64_t countLike(const Envelope& envelope,
+                                        std::uint64_t most) const noexcept {
+    const auto like = EnvelopeWords::of(envelope, 1, envelope.bodyBytes);
+    std::uint64_t count = 0;
+    while (count < most && isLike(like, envelope.clientExtra, taken_ + count)) ++count;
+    return count;
+  }
+  [[nodiscard]] bool isLike(const EnvelopeWords& like, std::int32_t clientExtra,
+                            std::uint64_t position) const noexcept {
+    const auto& other = slot(position);
+    const auto has = [&](std::size_t at, std::uint64_t word) {
+      return std::memcmp(reinterpret_cast<const std::byte*>(&other) + at, &word, sizeof word) == 0;
+    };
+    // PAIR(slot-filled): the message is complete.
+    return other.sequence.load(std::memory_order_acquire) == position + 1 &&
+           has(offsetof(layout::Slot, type), like.body) &&
+           has(offsetof(layout::Slot, requestId), like.request) &&
+           other.clientExtra == clientExtra && has(offsetof(layout::Slot, deadlineNs), like.timeNs);
+  }
+
+  void end(std::uint64_t slots) noexcept {
     taken_ += slots;
     first_ = &slot(taken_);
     if (taken_ >= batchEnd_) endBatch();

@@ -48,6 +48,9 @@ class MpfPeer final : public Peer {
     dispatcher_.emplace(Backplane::attach(places_.clientBackplane),
                         DispatcherOptions{waitMode(options_.mode), {}});
     client_.emplace(*dispatcher_, [this](Message&& message) { take(message); });
+    if (places_.inRuns)
+      client_->template onValues<Int32>(
+          [this](std::span<const Int32> values, const Message&) { received_ += values.size(); });
     client_->bind(kServer, places_.location);
     if (!client_->connectWait(kConnectLimit))
       throw std::runtime_error("not connected: " + client_->notConnectedBecause());
@@ -222,14 +225,15 @@ PeerFamily mpfPeer() {
   return family;
 }
 
-PeerFamily mpfBatchPeer() {
+PeerFamily mpfBatchPeer(bool inRuns) {
   PeerFamily family;
-  family.name = std::string(kMpf) + ", 64 at a time";
+  family.name = std::string(kMpf) + (inRuns ? ", 64 at a time, taken in runs" : ", 64 at a time");
   family.modes = {Mode::spin, Mode::adaptive, Mode::block};
-  family.make = [](const PeerOptions& options) {
-    return makeMpfPeer<Char8Array>(
-        options,
-        {.serverBackplane = options.name, .clientBackplane = options.name, .inBatches = true});
+  family.make = [inRuns](const PeerOptions& options) {
+    return makeMpfPeer<Char8Array>(options, {.serverBackplane = options.name,
+                                             .clientBackplane = options.name,
+                                             .inBatches = true,
+                                             .inRuns = inRuns});
   };
   return family;
 }

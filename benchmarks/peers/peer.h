@@ -93,7 +93,8 @@ struct PeerFamily {
 };
 
 [[nodiscard]] PeerFamily mpfPeer();
-[[nodiscard]] PeerFamily mpfBatchPeer();  // replyMany() of values; one-way traffic only
+// replyMany() of values, and with `inRuns` onValues(); one-way traffic only
+[[nodiscard]] PeerFamily mpfBatchPeer(bool inRuns);
 [[nodiscard]] PeerFamily boostPeer();
 [[nodiscard]] PeerFamily socketPeer();
 [[nodiscard]] PeerFamily zeromqPeer();

@@ -154,7 +154,7 @@ std::vector<Measurement> peerMeasurements(const std::string& runName) {
   auto oneWayFamilies = all;
   std::erase_if(oneWayFamilies,
                 [](const auto& family) { return !family.oneWay && family.skipped.empty(); });
-  oneWayFamilies.insert(oneWayFamilies.begin() + 1, mpfBatchPeer());
+  oneWayFamilies.insert(oneWayFamilies.begin() + 1, {mpfBatchPeer(false), mpfBatchPeer(true)});
   for (const auto& family : oneWayFamilies) {
     for (const auto mode : modesOf(family)) {
       auto row = asker.row(family, "One way, 4 B", mode, 4, false);

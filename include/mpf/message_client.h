@@ -86,6 +86,28 @@ class MessageClient {
   //           client is already bound
   void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
 
+  // Sets a callback for the replies of type T, before bind(). It receives those that follow one
+  // another and belong to the same request together, up to 16 at a time: a subscriber to many
+  // numbers needs a fraction of the time. All other messages go to the callback of the constructor.
+  //
+  //   client.onValues<mpf::Int32>(
+  //       [&](std::span<const mpf::Int32> values, const mpf::Message& first) { ... });
+  //
+  //   values  at least one, in the order of the replies; valid until the callback returns
+  //   first   the message of the first value. Its clientType, clientExtra and time stamp are those
+  //           of all values; if it is the first reply to its request, the request has ended
+  //   throws  std::logic_error when the client is bound already
+  // A callback that throws has received all of the values.
+  template <ScalarBody T>
+  void onValues(std::function<void(std::span<const T> values, const Message& first)> callback) {
+    static_assert(T::kType != MessageType::connect && T::kType != MessageType::requestFate);
+    setValueHandler(
+        T::kType, sizeof(T),
+        [callback = std::move(callback)](std::span<const std::byte> values, const Message& first) {
+          callback({reinterpret_cast<const T*>(values.data()), values.size() / sizeof(T)}, first);
+        });
+  }
+
   // Sends `message` and empties it. When the result is not `sent`, the message is unchanged. Never
   // waits.
   //   takeBefore  a request that the server has not received by then ends as `expired`
@@ -140,6 +162,9 @@ class MessageClient {
   friend class SyncClient;  // for isInherited()
   friend class RelayClient;  // internal, for routers
   MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback);
+  void setValueHandler(
+      MessageType type, std::size_t size,
+      std::function<void(std::span<const std::byte> values, const Message& first)> callback);
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] bool isInherited() const noexcept;
   std::shared_ptr<Dispatcher> shared_;  // null when the client was given a dispatcher

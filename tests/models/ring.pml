@@ -2,8 +2,8 @@
 // Ring: messages of 1 or 2 slots from one producer to one consumer, with weak memory. Either may be
 // killed before any step.
 //
-//   MODELS  shm/ring.h: RingProducer tryPush hasFree waiting isTaken
-//   MODELS  shm/ring_consumer.h: RingConsumer hasMessage begin copyBody end
+//   MODELS  shm/ring.h: RingProducer tryPush pushRun hasFree waiting isTaken
+//   MODELS  shm/ring_consumer.h: RingConsumer hasMessage begin copyBody end takeLike
 //   HOLDS   each message arrives once, whole and in order, while both processes run; no message
 //           waits forever for slots
 //   HOLDS   after the death of a producer, exactly the messages with a completed release store
@@ -19,6 +19,8 @@
 //   BREAK   FREED_EARLY        slots are freed before they are read
 //   BREAK   ONE_SLOT_TOO_MANY  the producer uses one slot that is not free
 //   BREAK   TAKEN_LATE         a message is counted as taken after the consumer has looked at it
+//   BREAK   TAKEN_IN_PART      of two messages that are taken together, only one is counted before
+//                              the consumer has looked at both
 #define CAPACITY 4
 #define BATCH 2
 #define MESSAGES 4
@@ -105,6 +107,11 @@ judge:
 
 #define hasMessage (memory[SEQUENCE(taken)] == taken + 1)
 
+// Two messages of one slot, of which the consumer has seen only the envelopes.
+#define hasTwo \
+  (hasMessage && memory[SEQUENCE(taken + 1)] == taken + 2 && memory[BODY(taken)] % 2 == 0 && \
+   memory[BODY(taken + 1)] % 2 == 0)
+
 inline look() {
 #ifdef NO_ACQUIRE
   d_step { body = early; acted = messages }
@@ -124,6 +131,38 @@ inline handBack() {
   freed = taken + slots
 }
 
+inline takeOne() {
+  messages++;
+#ifdef TAKEN_LATE
+  look();
+  storeRelease(CONSUMER, TAKEN, messages);
+#else
+  storeRelease(CONSUMER, TAKEN, messages);
+#ifdef FREED_EARLY
+  slots = 2;
+  handBack();
+#endif
+  look()
+#endif
+}
+
+inline takeTwo() {
+  messages = messages + 2;
+#ifdef TAKEN_IN_PART
+  storeRelease(CONSUMER, TAKEN, messages - 1);
+#else
+  storeRelease(CONSUMER, TAKEN, messages);
+#endif
+  d_step { body = memory[BODY(taken)]; acted = messages };
+  assert(body / 2 == messages - 1);
+  body = memory[BODY(taken + 1)];
+  assert(body / 2 == messages);
+#ifdef TAKEN_IN_PART
+  storeRelease(CONSUMER, TAKEN, messages);
+#endif
+  slots = 2
+}
+
 active proctype Consumer() {
   byte taken, freed, messages, slots, body, early;
   {
@@ -134,21 +173,10 @@ active proctype Consumer() {
       early = memory[BODY(taken)];
 #endif
       if
-      :: hasMessage
+      :: hasMessage -> takeOne()
+      :: hasTwo -> takeTwo()
       :: isGone(PRODUCER) && !hasMessage -> assert(messages == sent); goto ended
       fi;
-      messages++;
-#ifdef TAKEN_LATE
-      look();
-      storeRelease(CONSUMER, TAKEN, messages);
-#else
-      storeRelease(CONSUMER, TAKEN, messages);
-#ifdef FREED_EARLY
-      slots = 2;
-      handBack();
-#endif
-      look();
-#endif
 #ifndef FREED_EARLY
       if
       :: taken + slots - freed >= BATCH || memory[SEQUENCE(taken + slots)] != taken + slots + 1 -> handBack()

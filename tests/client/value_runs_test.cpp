@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: MIT
+// MessageClient::onValues(): replies that arrive together.
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "tests/client/client_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using testing::ElementsAre;
+
+class ValueRuns : public ClientTest {
+ protected:
+  // What one call of the callback received.
+  struct Run {
+    std::vector<std::int32_t> values;
+    std::int32_t clientType;
+    std::int32_t clientExtra;
+    std::int64_t timeStampNs;
+    bool endsRequest;
+    std::size_t otherMessages;  // that arrived before
+  };
+  void SetUp() override {
+    client_.onValues<Int32>([this](std::span<const Int32> values, const Message& first) {
+      Run run{{},
+              first.getClientType(),
+              first.getClientExtra(),
+              first.getTimeStampNs(),
+              (first.route().flags & kEndsRequest) != 0,
+              messages_.size()};
+      for (const auto& each : values) run.values.push_back(each.value);
+      received_ += values.size();
+      runs_.push_back(std::move(run));
+      if (mustThrow_) throw std::runtime_error("the callback throws");
+    });
+  }
+  static std::vector<Int32> readings(std::int32_t count, std::int32_t first = 0) {
+    std::vector<Int32> values;
+    for (std::int32_t i = 0; i < count; ++i) values.push_back({.value = first + i});
+    return values;
+  }
+  void receive(std::size_t values) {
+    runUntil([&] { return received_ >= values; });
+    EXPECT_EQ(received_, values);
+  }
+  [[nodiscard]] std::vector<std::vector<std::int32_t>> valuesOfRuns() const {
+    std::vector<std::vector<std::int32_t>> all;
+    for (const auto& run : runs_) all.push_back(run.values);
+    return all;
+  }
+  void reply(const Message& request, std::int32_t value, std::int64_t timeStampNs = 0) {
+    auto message = server_->allocReplyMessage<Int32>(request);
+    message->value = value;
+    message.setTimeStampNs(timeStampNs);
+    ASSERT_EQ(server_->reply(std::move(message)), ReplyResult::sent);
+  }
+  // A request of this client, after heldRequest().
+  Message another(std::int32_t clientType) {
+    const auto held = std::make_shared<Message>();
+    server_->on<Int32>([held](Int32Message&& request) { *held = std::move(request); });
+    Int32Message request;
+    request.setClientType(clientType);
+    request.setClientExtra(-clientType);
+    EXPECT_EQ(client_.send(std::move(request)), SendResult::sent);
+    runUntil([&] { return static_cast<bool>(*held); });
+    return std::move(*held);
+  }
+
+  std::vector<Run> runs_;
+  std::size_t received_ = 0;
+  bool mustThrow_ = false;
+};
+
+TEST_F(ValueRuns, ArriveInOrderWithFewCalls) {
+  startServer({.queueSize = 256});
+  const auto request = heldRequest();
+
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(100)).count, 100u);
+  receive(100);
+
+  std::int32_t next = 0;
+  for (const auto& run : runs_) {
+    EXPECT_LE(run.values.size(), 16u);
+    for (const auto value : run.values) EXPECT_EQ(value, next++);
+  }
+  EXPECT_LE(runs_.size(), 10u);
+}
+
+TEST_F(ValueRuns, HaveTheMarksOfTheirRequestAndTheFirstOneEndsIt) {
+  startServer();
+  const auto first = heldRequest();
+  const auto request = another(7);
+
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(20)).count, 20u);
+  receive(20);
+
+  for (const auto& run : runs_) {
+    EXPECT_EQ(run.clientType, 7);
+    EXPECT_EQ(run.clientExtra, -7);
+    EXPECT_EQ(run.endsRequest, &run == runs_.data());
+  }
+}
+
+TEST_F(ValueRuns, EndAtTheReplyToAnotherRequest) {
+  startServer();
+  const auto one = heldRequest();
+  const auto two = another(0);  // the same marks
+  for (const auto* request : {&one, &two}) reply(*request, 0);
+  receive(2);
+  runs_.clear();
+
+  for (const auto& [request, value] :
+       std::to_array<std::pair<const Message*, std::int32_t>>({{&one, 1}, {&one, 2}, {&two, 3}}))
+    reply(*request, value);
+  receive(5);
+
+  EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(1, 2), ElementsAre(3)));
+}
+
+TEST_F(ValueRuns, DoNotContainTheFirstReplyToAnotherRequest) {
+  startServer();
+  std::vector<Message> requests;
+  requests.push_back(heldRequest());
+  for (int i = 0; i < 2; ++i) requests.push_back(another(0));
+
+  for (const auto& request : requests) reply(request, 5);
+  receive(3);
+
+  EXPECT_EQ(runs_.size(), 3u);
+  for (const auto& run : runs_) EXPECT_TRUE(run.endsRequest);
+}
+
+TEST_F(ValueRuns, EndAtAMessageOfAnotherTypeWhichGoesToTheCallback) {
+  startServer();
+  const auto request = heldRequest();
+
+  reply(request, 1);
+  reply(request, 2);
+  ASSERT_EQ(server_->reply(server_->allocReplyMessage<Char8Array>(request, 3)), ReplyResult::sent);
+  reply(request, 3);
+  receive(3);
+
+  EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(1, 2), ElementsAre(3)));
+  EXPECT_EQ(runs_[0].otherMessages, 0u);
+  EXPECT_EQ(runs_[1].otherMessages, 1u);
+  EXPECT_EQ(next().getType(), MessageType::char8Array);
+}
+
+TEST_F(ValueRuns, EndWhereTheTimeStampChanges) {
+  startServer();
+  const auto request = heldRequest();
+
+  for (const std::int64_t stamp : {5, 5, 6})
+    reply(request, static_cast<std::int32_t>(stamp), stamp);
+  receive(3);
+
+  EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(5, 5), ElementsAre(6)));
+  EXPECT_EQ(runs_[0].timeStampNs, 5);
+  EXPECT_EQ(runs_[1].timeStampNs, 6);
+}
+
+TEST_F(ValueRuns, OfAFullRingArriveInOrderAroundItsEnd) {
+  startServer({.queueSize = 2});
+  const auto request = heldRequest();
+  const auto values = readings(1000);
+
+  for (std::span<const Int32> rest = values; !rest.empty();) {
+    rest = rest.subspan(server_->replyMany<Int32>(request, rest).count);
+    receive(1000 - rest.size());
+  }
+
+  std::int32_t next = 0;
+  for (const auto& run : runs_)
+    for (const auto value : run.values) ASSERT_EQ(value, next++);
+}
+
+TEST_F(ValueRuns, CountAsReceivedMessages) {
+  startServer({.queueSize = 256});
+  const auto request = heldRequest();
+  const auto before = sumOf(&layout::WindowControl::received);
+
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(50)).count, 50u);
+  receive(50);
+
+  EXPECT_EQ(sumOf(&layout::WindowControl::received), before + 50);
+}
+
+TEST_F(ValueRuns, ThatTheCallbackThrewAtAreDelivered) {
+  startServer();
+  const auto request = heldRequest();
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(8)).count, 8u);
+  mustThrow_ = true;
+  EXPECT_THROW(receive(8), std::runtime_error);
+  mustThrow_ = false;
+
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(8, 8)).count, 8u);
+  receive(16);
+
+  std::int32_t next = 0;
+  for (const auto& run : runs_)
+    for (const auto value : run.values) EXPECT_EQ(value, next++);
+}
+
+// Longer values than a slot holds come one by one.
+TEST_F(ValueRuns, MayBeLong) {
+  startServer();
+  std::vector<double> numbers;
+  MessageClient other(dispatcher_, [](const Message&) {});
+  other.onValues<Float64>([&](std::span<const Float64> values, const Message&) {
+    for (const auto& value : values) numbers.push_back(value.value);
+  });
+  Message request;
+  server_->on<Int32>([&](Int32Message&& one) { request = std::move(one); });
+  other.bind("device[0]/a");
+  runUntil([&] { return other.isConnected(); });
+  ASSERT_EQ(other.send(Int32Message()), SendResult::sent);
+  runUntil([&] { return static_cast<bool>(request); });
+
+  ASSERT_EQ(
+      server_->replyMany<Float64>(request, std::vector<Float64>{{.value = 1.5}, {.value = 2.5}})
+          .count,
+      2u);
+  runUntil([&] { return numbers.size() == 2; });
+
+  EXPECT_THAT(numbers, ElementsAre(1.5, 2.5));
+}
+
+TEST_F(ValueRuns, DoNotContainInvalidBodies) {
+  startServer();
+  const auto request = heldRequest();
+  reply(request, 1);
+  auto message = Message::copyOf(MessageType::int32, std::vector<std::byte>(2));
+  message.setRoute(request.route());
+  ASSERT_EQ(server_->reply(std::move(message)), ReplyResult::sent);
+  reply(request, 2);
+  receive(2);
+
+  EXPECT_FALSE(next().isSound());
+  EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(1), ElementsAre(2)));
+}
+
+TEST_F(ValueRuns, MayDestroyTheirClient) {
+  startServer();
+  std::vector<std::int32_t> values;
+  auto other = std::make_unique<MessageClient>(dispatcher_, [](const Message&) {});
+  other->onValues<Int32>([&](std::span<const Int32> run, const Message&) {
+    other.reset();
+    for (const auto& each : run) values.push_back(each.value);
+  });
+  Message request;
+  server_->on<Int32>([&](Int32Message&& one) { request = std::move(one); });
+  other->bind("device[0]/a");
+  runUntil([&] { return other->isConnected(); });
+  ASSERT_EQ(other->send(Int32Message()), SendResult::sent);
+  runUntil([&] { return static_cast<bool>(request); });
+
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(30)).count, 30u);
+  runUntil([&] { return !values.empty(); });
+
+  EXPECT_EQ(other, nullptr);
+  EXPECT_LT(values.size(), 30u);
+}
+
+TEST_F(ValueRuns, NeedTheirCallbackBeforeBind) {
+  startServer();
+  bind();
+
+  EXPECT_THROW(client_.onValues<Int32>({}), std::logic_error);
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: MIT
+// Ring: messages with the same envelope, which one end pushes, and the other takes, together.
+#include <cstring>
+
+#include "tests/shm/ring_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using testing::ElementsAre;
+
+class RingRunTest : public testing::Test {
+ protected:
+  static constexpr std::uint32_t kCapacity = 128;  // batches of 16
+  static constexpr std::uint64_t kMost = 15;
+  static constexpr Envelope kEnvelope{.type = 3,
+                                      .bodyBytes = layout::kFirstSlotBodyBytes,
+                                      .requestId = 4,
+                                      .clientType = 5,
+                                      .clientExtra = 6,
+                                      .timeNs = 7};
+
+  void push(std::uint64_t number, const Envelope& envelope = kEnvelope) {
+    Bytes body(envelope.bodyBytes);
+    std::memcpy(body.data(), &number, std::min(sizeof number, body.size()));
+    ASSERT_TRUE(producer_.tryPush(envelope, body));
+  }
+  // Bodies that begin with numbers from `first` on, one after the other.
+  static Bytes bodies(std::uint64_t first, std::size_t count) {
+    Bytes all(count * layout::kFirstSlotBodyBytes);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto number = first + i;
+      std::memcpy(all.data() + i * layout::kFirstSlotBodyBytes, &number, sizeof number);
+    }
+    return all;
+  }
+  // Pushes as many as fit; returns their number.
+  std::size_t pushAll(std::uint64_t first, std::size_t count, std::uint32_t reserve = 0) {
+    const auto all = bodies(first, count);
+    std::size_t pushed = 0;
+    for (;;) {
+      const auto* const next = all.data() + pushed * layout::kFirstSlotBodyBytes;
+      const auto more = producer_.pushRun(kEnvelope, next, count - pushed, reserve);
+      pushed += more;
+      if (more == 0 || pushed == count) return pushed;
+    }
+  }
+  // Takes the next message; returns the numbers and the ticks of those that are taken with it.
+  std::vector<std::uint64_t> takeLike(std::uint64_t most = kMost) {
+    static_cast<void>(consumer_.begin());
+    consumer_.end();
+    std::vector<std::uint64_t> numbers;
+    ticks_.clear();
+    consumer_.takeLike(kEnvelope, most, [&](const FirstBody& body, std::uint32_t tick) {
+      numbers.push_back(body.first);
+      ticks_.push_back(tick);
+    });
+    return numbers;
+  }
+
+  std::unique_ptr<layout::Slot[]> slots_ = std::make_unique<layout::Slot[]>(kCapacity);
+  layout::RingControl control_{};
+  RingProducer producer_{slots_.get(), kCapacity, control_};
+  RingConsumer consumer_{slots_.get(), kCapacity, control_};
+  std::vector<std::uint32_t> ticks_;
+};
+
+TEST_F(RingRunTest, TakesWhatIsThereAndCountsIt) {
+  for (const auto number : {10u, 11u, 12u}) push(number);
+
+  EXPECT_THAT(takeLike(), ElementsAre(11, 12));
+
+  EXPECT_EQ(consumer_.messages(), 3u);
+  EXPECT_EQ(control_.taken.load(std::memory_order_relaxed), 3u);
+  EXPECT_FALSE(consumer_.hasMessage());
+  push(13);
+  EXPECT_TRUE(consumer_.hasMessage());
+}
+
+TEST_F(RingRunTest, TakesNothingIfNothingFollows) {
+  push(10);
+
+  EXPECT_THAT(takeLike(), ElementsAre());
+
+  EXPECT_EQ(control_.taken.load(std::memory_order_relaxed), 1u);
+}
+
+TEST_F(RingRunTest, TakesNoMoreThanItIsAllowedTo) {
+  for (const auto number : {10u, 11u, 12u, 13u}) push(number);
+
+  EXPECT_THAT(takeLike(2), ElementsAre(11, 12));
+  EXPECT_THAT(takeLike(0), ElementsAre());
+}
+
+TEST_F(RingRunTest, StopsAtTheEndOfABatchAndFreesIt) {
+  for (std::uint64_t number = 0; number < 20; ++number) push(number);
+  static_cast<void>(takeLike(0));
+
+  EXPECT_EQ(takeLike(100).size(), 14u);
+
+  EXPECT_EQ(control_.freed.load(std::memory_order_relaxed), 16u);
+}
+
+TEST_F(RingRunTest, TheTickMayDiffer) {
+  auto timed = kEnvelope;
+  timed.sentTick = 99;
+  push(10);
+  push(11, timed);
+  push(12);
+
+  EXPECT_THAT(takeLike(), ElementsAre(11, 12));
+
+  EXPECT_THAT(ticks_, ElementsAre(99, 0));
+}
+
+TEST_F(RingRunTest, StopsAtAnyOtherEnvelope) {
+  using Change = void (*)(Envelope&);
+  for (const Change change : std::to_array<Change>({
+           [](Envelope& envelope) { ++envelope.type; },
+           [](Envelope& envelope) { envelope.flags = layout::kSlotFirstReply; },
+           [](Envelope& envelope) { envelope.flags = layout::kSlotChunk; },
+           [](Envelope& envelope) { --envelope.bodyBytes; },
+           [](Envelope& envelope) { envelope.bodyBytes = layout::kFirstSlotBodyBytes + 1; },
+           [](Envelope& envelope) { ++envelope.requestId; },
+           [](Envelope& envelope) { ++envelope.clientType; },
+           [](Envelope& envelope) { ++envelope.clientExtra; },
+           [](Envelope& envelope) { ++envelope.timeNs; },
+       })) {
+    auto other = kEnvelope;
+    change(other);
+    push(10);
+    push(11);
+    push(12, other);
+
+    EXPECT_THAT(takeLike(), ElementsAre(11));
+
+    ASSERT_TRUE(consumer_.hasMessage());
+    EXPECT_EQ(consumer_.begin().bodyBytes, other.bodyBytes);
+    consumer_.end();
+    consumer_.onEmpty();
+  }
+}
+
+TEST_F(RingRunTest, PushesEachBodyWithTheEnvelope) {
+  ASSERT_EQ(pushAll(10, 3), 3u);
+
+  EXPECT_EQ(producer_.messages(), 3u);
+  for (const auto number : {10u, 11u, 12u}) {
+    ASSERT_TRUE(consumer_.hasMessage());
+    const auto envelope = consumer_.begin();
+    EXPECT_TRUE(consumer_.hasOneSlot());
+    EXPECT_EQ(envelope.type, kEnvelope.type);
+    EXPECT_EQ(envelope.flags, 0);
+    EXPECT_EQ(envelope.bodyBytes, kEnvelope.bodyBytes);
+    EXPECT_EQ(envelope.requestId, kEnvelope.requestId);
+    EXPECT_EQ(envelope.clientType, kEnvelope.clientType);
+    EXPECT_EQ(envelope.clientExtra, kEnvelope.clientExtra);
+    EXPECT_EQ(envelope.timeNs, kEnvelope.timeNs);
+    EXPECT_EQ(consumer_.firstBody().first, number);
+    consumer_.end();
+  }
+  EXPECT_FALSE(consumer_.hasMessage());
+}
+
+TEST_F(RingRunTest, OnlyTheFirstMessageOfAPushIsTimed) {
+  auto timed = kEnvelope;
+  timed.sentTick = 99;
+
+  ASSERT_EQ(producer_.pushRun(timed, bodies(10, 3).data(), 3, 0), 3u);
+
+  for (const auto tick : {99u, 0u, 0u}) {
+    EXPECT_EQ(consumer_.begin().sentTick, tick);
+    consumer_.end();
+  }
+}
+
+TEST_F(RingRunTest, KeepsTheReservedSlotsFree) {
+  EXPECT_EQ(pushAll(0, 2 * kCapacity, 5), kCapacity - 5);
+  EXPECT_EQ(pushAll(0, 1, 5), 0u) << "the ring is full but for the reserve";
+
+  EXPECT_EQ(pushAll(0, 2 * kCapacity), 5u);
+}
+
+TEST_F(RingRunTest, PushesAndTakesBodiesAroundTheEndOfTheRing) {
+  std::uint64_t pushed = 0;
+  std::uint64_t expected = 0;
+  for (int round = 0; round < 100; ++round) {
+    ASSERT_EQ(pushAll(pushed, 41), 41u);
+    pushed += 41;
+    while (consumer_.hasMessage()) {
+      ++expected;
+      for (const auto number : takeLike()) ASSERT_EQ(number, expected++);
+    }
+    consumer_.onEmpty();
+    ASSERT_EQ(expected, pushed);
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test
