@@ -154,8 +154,8 @@ void Binding::deliver(Message&& message) try {
   throw;
 }
 
-// Takes with a value those that follow it in the ring, if they fill a slot each. Not inline, so that
-// deliver() stays small.
+// Takes with a value those that follow it in the ring, if they fill a slot each. Not inline, so
+// that deliver() stays small.
 [[gnu::noinline]] void Binding::deliverValues(const Message& first) {
   if (first.body().size() != layout::kFirstSlotBodyBytes || values_.size != first.body().size())
     return values_.callback(first.body().first(values_.size), first);
