@@ -18,6 +18,12 @@ add_compile_options(-fno-semantic-interposition)
 add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}"
   "SHELL:-iquote ${CMAKE_BINARY_DIR}/generated")
 
+# The compiler collects its garbage later: for sources that are compiled together, this takes 10 to
+# 20 % less time and 150 to 250 MB more memory.
+if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  add_compile_options("SHELL:--param ggc-min-heapsize=600000")
+endif()
+
 add_library(mpf_warnings INTERFACE)
 target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
   -Wnon-virtual-dtor -Wold-style-cast -Werror)
