@@ -37,6 +37,8 @@ void Binding::setServer(const std::string& server, std::int32_t location) {
 void Binding::setValueHandler(ValueHandler handler) {
   if (state() != BindingState::unbound)
     throw std::logic_error("MessageClient::onValues(): the client is bound already");
+  if (values_.type != MessageType::none)
+    throw std::logic_error("MessageClient::onValues(): the client has a callback for values");
   values_ = std::move(handler);
 }
 

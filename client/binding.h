@@ -54,7 +54,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   }
   //   throws  as Connector::setServer()
   void setServer(const std::string& server, std::int32_t location);
-  //   throws  std::logic_error after setServer()
+  //   throws  std::logic_error after setServer(), and for a second handler
   void setValueHandler(ValueHandler handler);
   bool waitConnected(Deadline deadline) {
     return connector_.wait(deadline, [this] { return isConnected(); });
@@ -65,8 +65,8 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
 
   // --- dispatcher's thread ---
   void tryConnect();
-  // Handles up to `most` messages of the link, or one change of its state. Returns false when there
-  // was neither.
+  // Handles up to `most` messages or runs of values of the link, or one change of its state.
+  // Returns false when there was neither.
   bool takeSome(int most);
   enum class Ending {
     // The server is dead or has closed the link: it will not receive the remaining requests.

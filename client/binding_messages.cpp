@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Binding: takes the messages of the server and delivers them.
+#include <array>
+#include <cstring>
+
 #include "base/step.h"
 #include "client/binding.h"
 #include "shm/histogram.h"
@@ -37,7 +40,8 @@ bool Binding::takeSome(int most) {
 }
 
 // Delivers the messages that the server sent before it closed the link or died. A server that is
-// still alive could send without end, so no more calls are made than a ring has messages.
+// still alive could send without end, so this ends after as many messages, or runs of values, as
+// the rings have slots.
 void Binding::deliverRemaining(const MessageLink* ended) {
   while (sender_.channel().get() == ended && end_.remainingSlots != 0) {
     --end_.remainingSlots;
@@ -154,11 +158,16 @@ void Binding::deliver(Message&& message) try {
   throw;
 }
 
-// Takes with a value those that follow it in the ring, if they fill a slot each. Not inline, so
-// that deliver() stays small.
+// Calls the handler with the value of `first` and, if it fills a slot, those like it that follow in
+// the ring. Not inline, so that deliver() stays small.
 [[gnu::noinline]] void Binding::deliverValues(const Message& first) {
-  if (first.body().size() != layout::kFirstSlotBodyBytes || values_.size != first.body().size())
-    return values_.callback(first.body().first(values_.size), first);
+  const auto body = first.body();
+  if (body.size() != layout::kFirstSlotBodyBytes || values_.size != body.size()) {
+    // A copy: a body in shared memory may change.
+    alignas(8) std::array<std::byte, Message::kInlineBytes> value;
+    std::memcpy(value.data(), body.data(), values_.size);
+    return values_.callback(std::span(value).first(values_.size), first);
+  }
   const Envelope like{.type = static_cast<std::uint16_t>(first.getType()),
                       .bodyBytes = layout::kFirstSlotBodyBytes,
                       .requestId = first.route().requestId,
@@ -166,15 +175,13 @@ void Binding::deliver(Message&& message) try {
                       .clientExtra = first.getClientExtra(),
                       .timeNs = first.getTimeStampNs()};
   ValueRun run;
-  run.add(FirstBody::of(first.body().data()));
-  std::uint32_t sentTick = 0;
+  run.add(FirstBody::of(body.data()));
   const auto taken = channel().link().incoming().takeLike(
-      like, ValueRun::kMost - 1, [&](const FirstBody& body, std::uint32_t tick) {
-        run.add(body);
-        if (tick != 0) sentTick = tick;
+      like, ValueRun::kMost - 1, [&](const FirstBody& next, std::uint32_t sentTick) {
+        run.add(next);
+        if (sentTick != 0) noteTimes(sentTick, nullptr);
       });
   count(control().received, taken);
-  if (sentTick != 0) noteTimes(sentTick, nullptr);
   values_.callback(run.all(), first);
 }
 

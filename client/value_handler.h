@@ -18,7 +18,7 @@ namespace mpf {
 
 struct ValueHandler {
   MessageType type = MessageType::none;  // none: there is no handler
-  std::size_t size = 0;  // of a value
+  std::size_t size = 0;  // [bytes] of a value
   std::function<void(std::span<const std::byte> values, const Message& first)> callback;
 };
 
@@ -34,7 +34,7 @@ class ValueRun {
 
  private:
   std::size_t count_ = 0;
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): as far as `count_`
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): only the first `count_` have a value
   alignas(8) std::array<std::array<std::byte, layout::kFirstSlotBodyBytes>, kMost> values_;
 };
 

@@ -82,8 +82,8 @@ RepliedMany ReplySender::sendRun(const Message& request, ReplyBodies bodies) noe
   RepliedMany sent;
   const bool fillsSlot = bodies.size == layout::kFirstSlotBodyBytes &&
                          bodies.size <= connection.channel->link().maxMessageBytes();
-  // As messages: the first reply, which ends the request, and bodies of other lengths. Such a body
-  // could be sent in place, if it lay in a chunk, which belongs to the caller.
+  // The first reply, which ends the request, and bodies of other lengths go as messages. They are
+  // copies: a body in a chunk would be sent in place, and the chunk belongs to the caller.
   while (!bodies.all.empty() && (!fillsSlot || connection.owes(route.requestId))) {
     auto message = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
     message.setRoute({route.link, route.requestId, route.flags, nullptr});
@@ -110,14 +110,16 @@ void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& req
       .clientExtra = request.getClientExtra(),
       .timeNs = stamps_ ? Clock::wallNs() : 0,
   };
+  const auto noteSent = [&serverSent = link.control().serverSent](std::uint64_t messages) {
+    MPF_STEP(reply_sent);
+    serverSent.store(messages, std::memory_order_relaxed);
+  };
   while (!bodies.all.empty()) {
-    const auto count = link.trySendRun(envelope, bodies.all, link.slotsOfFirstReplies());
+    const auto count = link.trySendRun(envelope, bodies.all, link.slotsOfFirstReplies(), noteSent);
     if (count == 0) {
       sent.result = noteRefused(LinkSend::full);
       return;
     }
-    MPF_STEP(reply_sent);
-    link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
     sent.count += count;
     bodies.all = bodies.all.subspan(count * bodies.size);
   }

@@ -74,8 +74,8 @@ struct Envelope {
   }
 };
 
-// An envelope as a first slot holds it. In words of 64 bits, because the number of stores limits
-// the rate of messages.
+// An envelope as a first slot holds it, in words of 64 bits: the number of stores limits the rate
+// of messages.
 struct EnvelopeWords {
   std::uint64_t body, request, client, timeNs;
 

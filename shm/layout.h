@@ -267,7 +267,7 @@ enum class Watch : std::uint32_t { polled = 0, unwatched = 1, polledUnfenced = 2
 // it again and again, and on a shared line each store to `taken` would wait.
 struct RingControl {
   alignas(kPairBytes) Word64 freed;  // slots before this position may be overwritten
-  // messages taken so far; the consumer has not looked at a message that is not counted here
+  // messages taken so far; the consumer has not looked at the body of a message that is not counted
   alignas(kPairBytes) Word64 taken;
 };
 

@@ -339,12 +339,12 @@ void Link::afterFencedPush() noexcept {
   NoticeBatch::notify(peer_, peerIndex_, room / 2);
 }
 
-// Of the messages to a peer that polls, one in kMaxInterval is timed; of others, those that the
-// sampler chooses.
+// Of each kMaxInterval messages to a peer that polls, the first one for which this is called is
+// timed; of others, those that the sampler chooses.
 std::int64_t Link::timeIfDue(bool isPolled) noexcept {
   constexpr auto kInterval = TimeSampler::kMaxInterval;
   const auto sent = out_.messages();
-  if (!(isPolled ? sent % kInterval == 0 : sampler_.isDue(sent))) {
+  if (!(isPolled ? sampler_.isFirst(sent) : sampler_.isDue(sent))) {
     untimedUntil_ = (sent / kInterval + 1) * kInterval;
     return 0;
   }

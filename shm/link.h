@@ -159,14 +159,15 @@ class Link {
                    Limits limits) noexcept {
     return trySend([&]() -> const Envelope& { return envelope; }, body, limits);
   }
-  // Sends messages that differ only in their bodies, which fill a slot each and lie one after the
-  // other. Sets the tick of the envelope. Returns how many were sent, perhaps not as many as fit;
-  // 0: the ring is full.
+  // Sends messages with the same envelope, whose tick it sets. Each body fills a slot; they lie one
+  // after the other. Calls `sent(messages)` after each, with the number of all messages so far.
+  // Returns how many were sent, perhaps fewer than fit; 0: the ring is full.
+  template <class Sent>
   std::size_t trySendRun(Envelope& envelope, std::span<const std::byte> bodies,
-                         std::uint32_t reserve) noexcept {
+                         std::uint32_t reserve, const Sent& sent) noexcept {
     envelope.sentTick = Tick::ofSample(timeOfNext());
-    const auto count =
-        out_.pushRun(envelope, bodies.data(), bodies.size() / layout::kFirstSlotBodyBytes, reserve);
+    const auto most = bodies.size() / layout::kFirstSlotBodyBytes;
+    const auto count = out_.pushRun(envelope, bodies.data(), most, reserve, sent);
     if (count != 0) afterPush();
     return count;
   }

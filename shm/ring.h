@@ -96,11 +96,14 @@ class RingProducer {
     if (isPolledElsewhere_ && reserve == 0) lines::offer(&first);
     return true;
   }
-  // Pushes up to `most` messages that differ only in their bodies, which fill a slot each and lie
-  // one after the other in `bodies`, until fewer than `reserve` free slots would remain or the next
-  // lines are to be claimed. Only the first message has the tick. Returns the number of messages.
+  // Pushes messages with the same envelope, but that only the first has its tick. Each body fills a
+  // slot; they lie one after the other. Stops after `most` messages, before fewer than `reserve`
+  // slots would be free, or at the next claim of lines. Returns the number of messages; 0 if fewer
+  // than 1 + `reserve` slots are free. `pushed(messages)` is called after each.
+  template <class Pushed>
   [[nodiscard]] std::size_t pushRun(const Envelope& envelope, const std::byte* bodies,
-                                    std::size_t most, std::uint32_t reserve) noexcept {
+                                    std::size_t most, std::uint32_t reserve,
+                                    const Pushed& pushed) noexcept {
     if (!hasFree(1 + reserve)) return 0;
     if (pushed_ >= claimed_) claimLines();
     const auto count = std::min({most, freeEnd_ - reserve - pushed_, claimed_ - pushed_});
@@ -117,9 +120,9 @@ class RingProducer {
       // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
       message.sequence.store(++position, std::memory_order_release);
       MPF_STEP(slot_published);
+      pushed(++messages_);
     }
     pushed_ = position;
-    messages_ += count;
     next_.store(&slot(pushed_), std::memory_order_relaxed);
     return count;
   }

@@ -110,9 +110,10 @@ class RingConsumer {
   }
   // The same if hasOneSlot().
   void endOneSlot() noexcept { end(1); }
-  // Takes messages that follow the one that was ended last, as many as are there, at most `most`
-  // and to the end of the batch: those of one slot that differ from `like` only in body and tick.
-  // Calls `take(body, sentTick)` for each; returns their number.
+  // Takes the messages after the one that was ended last, while they have one slot and differ from
+  // `like` only in body and tick; at most `most`, and not beyond the end of the batch. Counts all
+  // of them as taken before it reads a body. Calls `take(body, sentTick)` for each; returns their
+  // number.
   template <class Take>
   std::uint64_t takeLike(const Envelope& like, std::uint64_t most, const Take& take) noexcept {
     const auto count = countLike(like, std::min(most, batchEnd_ - taken_));

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// TimeSampler: chooses which messages to a peer that does not poll get a time stamp: all of them,
-// or of fast traffic one in 2 to 64, because reading the clock costs as much as a message. The
-// recent rate decides. The distance between samples varies, so that bursts are sampled evenly, from
-// their first messages, which wake the peer, to their last ones. After a rest, all messages are
-// timed until the rate is known again.
+// TimeSampler: chooses which messages get a time stamp. To a peer that polls: the first in each 64.
+// To another: all of them, or of fast traffic one in 2 to 64, because reading the clock costs as
+// much as a message. The recent rate decides. The distance between samples varies, so that bursts
+// are sampled evenly, from their first messages, which wake the peer, to their last ones. After a
+// rest, all messages are timed until the rate is known again. Of messages that are sent as one run,
+// only the first may be timed.
 //
 // Threads  one at a time.
 #pragma once
@@ -22,6 +23,10 @@ class TimeSampler {
   // after note(), its next attempt is due, too.
   [[nodiscard]] bool isDue(std::uint64_t sent) const noexcept {
     return sent >= due_ || sent == timed_;
+  }
+  // For a peer that polls: whether none of the same kMaxInterval messages was timed before.
+  [[nodiscard]] bool isFirst(std::uint64_t sent) const noexcept {
+    return sent == timed_ || sent / kMaxInterval != timed_ / kMaxInterval;
   }
   // That message gets the time `nowNs`.
   void note(std::uint64_t sent, std::int64_t nowNs) noexcept {

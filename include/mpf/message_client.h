@@ -86,21 +86,23 @@ class MessageClient {
   //           client is already bound
   void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
 
-  // Sets a callback for the replies of type T, before bind(). It receives those that follow one
-  // another and belong to the same request together, up to 16 at a time: a subscriber to many
-  // numbers needs a fraction of the time. All other messages go to the callback of the constructor.
+  // Sets the callback for valid replies of type T, once and before bind(). Replies that follow one
+  // another arrive together, up to 16 at a time, if they belong to the same request and have the
+  // same time stamp, and T is Int32 or OutOfBand; otherwise one by one. All other messages go to
+  // the callback of the constructor.
   //
   //   client.onValues<mpf::Int32>(
   //       [&](std::span<const mpf::Int32> values, const mpf::Message& first) { ... });
   //
-  //   values  at least one, in the order of the replies; valid until the callback returns
+  //   values  at least one, in the order of the replies; copies, valid until the callback returns
   //   first   the message of the first value. Its clientType, clientExtra and time stamp are those
   //           of all values; if it is the first reply to its request, the request has ended
-  //   throws  std::logic_error when the client is bound already
+  //   throws  std::logic_error when the client is bound already, or has such a callback
   // A callback that throws has received all of the values.
   template <ScalarBody T>
   void onValues(std::function<void(std::span<const T> values, const Message& first)> callback) {
     static_assert(T::kType != MessageType::connect && T::kType != MessageType::requestFate);
+    static_assert(sizeof(T) <= Message::kInlineBytes);
     setValueHandler(
         T::kType, sizeof(T),
         [callback = std::move(callback)](std::span<const std::byte> values, const Message& first) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// MessageClient::onValues(): replies that arrive together.
+// MessageClient::onValues(): replies that are delivered together.
+#include <cstring>
+#include <functional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -21,6 +23,7 @@ class ValueRuns : public ClientTest {
     std::int64_t timeStampNs;
     bool endsRequest;
     std::size_t otherMessages;  // that arrived before
+    std::size_t news;  // the same, of connections
   };
   void SetUp() override {
     client_.onValues<Int32>([this](std::span<const Int32> values, const Message& first) {
@@ -29,10 +32,12 @@ class ValueRuns : public ClientTest {
               first.getClientExtra(),
               first.getTimeStampNs(),
               (first.route().flags & kEndsRequest) != 0,
-              messages_.size()};
+              messages_.size(),
+              news_.size()};
       for (const auto& each : values) run.values.push_back(each.value);
       received_ += values.size();
       runs_.push_back(std::move(run));
+      if (onCall_) onCall_(values, first);
       if (mustThrow_) throw std::runtime_error("the callback throws");
     });
   }
@@ -56,6 +61,18 @@ class ValueRuns : public ClientTest {
     message.setTimeStampNs(timeStampNs);
     ASSERT_EQ(server_->reply(std::move(message)), ReplyResult::sent);
   }
+  // Messages whose time in the queue is known, in all windows of clients.
+  [[nodiscard]] std::uint64_t timedMessages() const {
+    std::uint64_t sum = 0;
+    for (const auto& name : backplane_.segmentNames()) {
+      const auto parsed = SegmentName::tryParse(name);
+      if (!parsed || parsed->kind != NameKind::clientWindow) continue;
+      const auto window = PeerWindow::tryOpen(name, layout::SegmentKind::clientWindow);
+      for (const auto& bucket : window->control().queueWaitNs.buckets)
+        sum += bucket.load(std::memory_order_relaxed);
+    }
+    return sum;
+  }
   // A request of this client, after heldRequest().
   Message another(std::int32_t clientType) {
     const auto held = std::make_shared<Message>();
@@ -71,6 +88,7 @@ class ValueRuns : public ClientTest {
   std::vector<Run> runs_;
   std::size_t received_ = 0;
   bool mustThrow_ = false;
+  std::function<void(std::span<const Int32>, const Message&)> onCall_;
 };
 
 TEST_F(ValueRuns, ArriveInOrderWithFewCalls) {
@@ -101,6 +119,7 @@ TEST_F(ValueRuns, HaveTheMarksOfTheirRequestAndTheFirstOneEndsIt) {
     EXPECT_EQ(run.clientExtra, -7);
     EXPECT_EQ(run.endsRequest, &run == runs_.data());
   }
+  EXPECT_GT(runs_[0].values.size(), 1u) << "the first reply begins a run";
 }
 
 TEST_F(ValueRuns, EndAtTheReplyToAnotherRequest) {
@@ -187,7 +206,7 @@ TEST_F(ValueRuns, CountAsReceivedMessages) {
   EXPECT_EQ(sumOf(&layout::WindowControl::received), before + 50);
 }
 
-TEST_F(ValueRuns, ThatTheCallbackThrewAtAreDelivered) {
+TEST_F(ValueRuns, AreDeliveredEvenIfTheCallbackThrows) {
   startServer();
   const auto request = heldRequest();
   ASSERT_EQ(server_->replyMany<Int32>(request, readings(8)).count, 8u);
@@ -263,11 +282,64 @@ TEST_F(ValueRuns, MayDestroyTheirClient) {
   EXPECT_LT(values.size(), 30u);
 }
 
-TEST_F(ValueRuns, NeedTheirCallbackBeforeBind) {
+// Such a body is a valid Int32 in shared memory, which the server may change.
+TEST_F(ValueRuns, AreCopiesOfLongerBodies) {
   startServer();
-  bind();
+  const auto request = heldRequest();
+  std::vector<std::byte> longer(1000);
+  const Int32 fields{.value = 5};
+  std::memcpy(longer.data(), &fields, sizeof fields);
+  auto message = Message::copyOf(MessageType::int32, longer);
+  message.setRoute(request.route());
+  bool isCopy = false;
+  onCall_ = [&](std::span<const Int32> values, const Message& first) {
+    isCopy = std::as_bytes(values).data() != first.body().data() && !first.isInline();
+  };
 
-  EXPECT_THROW(client_.onValues<Int32>({}), std::logic_error);
+  ASSERT_EQ(server_->reply(std::move(message)), ReplyResult::sent);
+  receive(1);
+
+  EXPECT_TRUE(isCopy);
+  EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(5)));
+}
+
+TEST_F(ValueRuns, AreTimedOneByOne) {
+  startServer();
+  const auto request = heldRequest();
+  reply(request, 0);
+  receive(1);
+  while (dispatcher_.runOnce(Deadline::after(1ms))) {
+  }  // now it does not poll: each reply is timed
+  const auto before = timedMessages();
+
+  for (std::int32_t value = 1; value <= 12; ++value) reply(request, value);
+  receive(13);
+
+  EXPECT_EQ(timedMessages(), before + 12);
+}
+
+TEST_F(ValueRuns, OfAServerThatEndsArriveBeforeTheDisconnect) {
+  startServer({.queueSize = 256});
+  const auto request = heldRequest();
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(100)).count, 100u);
+
+  server_.reset();
+  runUntil([&] { return news_.size() == 2; });
+
+  EXPECT_EQ(received_, 100u);
+  std::int32_t next = 0;
+  for (const auto& run : runs_) {
+    EXPECT_EQ(run.news, 1u);
+    for (const auto value : run.values) EXPECT_EQ(value, next++);
+  }
+}
+
+TEST_F(ValueRuns, NeedTheirCallbackOnceAndBeforeBind) {
+  EXPECT_THROW(client_.onValues<Float64>({}), std::logic_error) << "there is one for Int32";
+
+  MessageClient other(dispatcher_, [](const Message&) {});
+  other.bind("device[0]/a");
+  EXPECT_THROW(other.onValues<Int32>({}), std::logic_error);
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 //           waits forever for slots
 //   HOLDS   after the death of a producer, exactly the messages with a completed release store
 //           arrive
-//   HOLDS   a killed consumer has not looked at any message that is not counted as taken ("never
-//           taken" is true)
+//   HOLDS   a killed consumer has not looked at the body of any message that is not counted as taken
+//           ("never taken" is true)
 //   ASSUMES a ring of 4 slots, freed two at a time, and 4 messages: positions wrap around twice,
 //           messages cross the end of the ring
 //   ASSUMES both ends follow the protocol (tests/shm/ring_trust_test.cpp tests invalid data)

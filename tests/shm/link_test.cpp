@@ -3,8 +3,7 @@
 #include <cstring>
 #include <map>
 
-#include "tests/shm/endpoint_pair.h"
-#include "tests/shm/shm_fixture.h"
+#include "tests/shm/link_fixture.h"
 #include "tests/support/random.h"
 
 namespace mpf::test {
@@ -14,60 +13,6 @@ using layout::LinkState;
 using testing::HasSubstr;
 
 constexpr std::size_t kLarge = layout::kInlineBodyBytes + 1;  // does not fit into the ring
-
-class LinkTest : public ShmTest {
- protected:
-  void makeEnds(Offer offer = {}) {
-    server_.emplace(backplane_, "server", WaitMode::block, offer);
-    client_.emplace(backplane_, "", WaitMode::block);
-  }
-  Connected makeLink(Offer offer = {}) {
-    makeEnds(offer);
-    return connect(*client_, *server_);
-  }
-  void TearDown() override {
-    client_.reset();
-    server_.reset();
-    ShmTest::TearDown();
-  }
-  static std::vector<std::byte> filled(std::size_t bytes) {
-    std::vector<std::byte> body(bytes);
-    for (std::size_t i = 0; i < bytes; ++i) body[i] = static_cast<std::byte>(i * 7);
-    return body;
-  }
-  static LinkSend sendBody(Link& link, std::span<const std::byte> body, Link::Limits limits = {}) {
-    Envelope envelope{.requestId = 1};
-    return link.trySend(envelope, body, limits);
-  }
-  // Takes the next message and returns its whole body. Returns its chunk to the peer.
-  static std::vector<std::byte> take(Link& link) {
-    EXPECT_TRUE(link.incoming().hasMessage());
-    const auto envelope = link.incoming().begin();
-    std::vector<std::byte> body(envelope.bodyBytes);
-    if ((envelope.flags & layout::kSlotChunk) == 0) {
-      link.incoming().copyBody(body);
-    } else if (const auto chunk = link.tryChunk(envelope.bodyBytes)) {
-      std::memcpy(body.data(), chunk->data, body.size());
-      link.release(chunk->data);
-    } else {
-      ADD_FAILURE() << "no chunk";
-    }
-    link.incoming().end();
-    return body;
-  }
-  // The error with which the server refuses a link after its client has made this change.
-  std::string refusal(const std::function<void(layout::SegmentHeader&)>& change) {
-    const auto link = makeLink();
-    change(
-        Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)
-            ->sharedHeader());
-    return whatOf<SegmentError>(
-        [&] { Link::tryOpen(name(), link.client.name(), server_->endpoint.window()); });
-  }
-
-  std::optional<End> server_;
-  std::optional<End> client_;
-};
 
 class BodySizes : public LinkTest, public testing::WithParamInterface<std::size_t> {};
 
@@ -210,42 +155,6 @@ TEST_F(LinkTest, ABatchSetsTheReadyBitAtItsEnd) {
   EXPECT_EQ(takeBits(), std::uint64_t{1} << link.serverIndex);
   take(link.server);
   take(link.server);
-}
-
-TEST_F(LinkTest, TimesSlowMessagesToASleepingPeerAndOneIn64ToAPollingOne) {
-  const auto link = makeLink();
-  const auto timedOf = [&](int messages) {
-    int timed = 0;
-    for (int i = 0; i < messages; ++i) {
-      timed += link.client.timeOfNext() != 0 ? 1 : 0;
-      EXPECT_EQ(sendBody(link.client, {}), LinkSend::sent);
-      take(link.server);
-    }
-    return timed;
-  };
-  Link::execute(link.server.unwatch());
-
-  EXPECT_EQ(timedOf(10), 10);
-
-  link.server.watch(true);
-  timedOf(54);
-  EXPECT_EQ(timedOf(256), 4);
-
-  timedOf(5);
-  Link::execute(link.server.unwatch());
-  EXPECT_EQ(timedOf(1), 1) << "the first message after the peer has stopped polling";
-}
-
-TEST_F(LinkTest, TimesAMessageThatIsSentAtTheSecondAttempt) {
-  const auto link = makeLink();
-  Link::execute(link.server.unwatch());
-  while (sendBody(link.client, {}) == LinkSend::sent) {
-  }
-  const auto first = link.client.timeOfNext();
-  ASSERT_EQ(sendBody(link.client, {}), LinkSend::full);
-
-  EXPECT_NE(first, 0);
-  EXPECT_NE(link.client.timeOfNext(), 0);
 }
 
 TEST_F(LinkTest, EachSideRemovesItsFilesAtDestruction) {

@@ -40,12 +40,15 @@ class RingRunTest : public testing::Test {
     std::size_t pushed = 0;
     for (;;) {
       const auto* const next = all.data() + pushed * layout::kFirstSlotBodyBytes;
-      const auto more = producer_.pushRun(kEnvelope, next, count - pushed, reserve);
+      const auto more = producer_.pushRun(kEnvelope, next, count - pushed, reserve,
+                                          [&](auto messages) { counted_ = messages; });
+      EXPECT_EQ(counted_, producer_.messages());
       pushed += more;
       if (more == 0 || pushed == count) return pushed;
     }
   }
-  // Takes the next message; returns the numbers and the ticks of those that are taken with it.
+  // Takes the next message; returns the numbers of those that are taken with it, and keeps their
+  // ticks.
   std::vector<std::uint64_t> takeLike(std::uint64_t most = kMost) {
     static_cast<void>(consumer_.begin());
     consumer_.end();
@@ -63,6 +66,7 @@ class RingRunTest : public testing::Test {
   RingProducer producer_{slots_.get(), kCapacity, control_};
   RingConsumer consumer_{slots_.get(), kCapacity, control_};
   std::vector<std::uint32_t> ticks_;
+  std::uint64_t counted_ = 0;  // by the callback of pushRun()
 };
 
 TEST_F(RingRunTest, TakesWhatIsThereAndCountsIt) {
@@ -141,6 +145,53 @@ TEST_F(RingRunTest, StopsAtAnyOtherEnvelope) {
   }
 }
 
+TEST_F(RingRunTest, StopsAtAMessageOfSeveralSlotsAccordingToItsEnvelope) {
+  for (const auto slots : std::to_array<std::uint8_t>({0, 2, 255})) {
+    const auto at = consumer_.messages() + 1;
+    push(10);
+    push(11);
+    slots_[at % kCapacity].slots = slots;
+
+    EXPECT_THAT(takeLike(), ElementsAre()) << int{slots};
+
+    ASSERT_TRUE(consumer_.hasMessage());
+    slots_[at % kCapacity].slots = 1;
+    static_cast<void>(takeLike());
+  }
+}
+
+// A second, larger ring goes on where the first one is full.
+TEST_F(RingRunTest, CrossesIntoASecondRing) {
+  constexpr std::uint32_t kFirst = 16;
+  constexpr std::uint64_t kMessages = 100;
+  layout::Word32 hasMemory{1};
+  layout::Word64 moved{0};
+  const SecondRing second{slots_.get() + kFirst, 64, &hasMemory, &moved};
+  RingProducer producer(slots_.get(), kFirst, control_, second);
+  RingConsumer consumer(slots_.get(), kFirst, control_, second);
+  const auto all = bodies(0, kMessages);
+
+  std::uint64_t pushed = 0;
+  std::vector<std::uint64_t> taken;
+  while (taken.size() < kMessages) {
+    for (std::uint64_t more = 1; more != 0 && pushed < kMessages; pushed += more) {
+      more = producer.pushRun(kEnvelope, all.data() + pushed * layout::kFirstSlotBodyBytes,
+                              kMessages - pushed, 2, [](auto) {});
+    }
+    while (consumer.hasMessage()) {
+      static_cast<void>(consumer.begin());
+      taken.push_back(consumer.firstBody().first);
+      consumer.end();
+      consumer.takeLike(kEnvelope, kMost,
+                        [&](const FirstBody& body, std::uint32_t) { taken.push_back(body.first); });
+    }
+    consumer.onEmpty();
+  }
+
+  EXPECT_NE(moved.load(std::memory_order_relaxed), 0u);
+  for (std::uint64_t number = 0; number < kMessages; ++number) ASSERT_EQ(taken[number], number);
+}
+
 TEST_F(RingRunTest, PushesEachBodyWithTheEnvelope) {
   ASSERT_EQ(pushAll(10, 3), 3u);
 
@@ -166,7 +217,7 @@ TEST_F(RingRunTest, OnlyTheFirstMessageOfAPushIsTimed) {
   auto timed = kEnvelope;
   timed.sentTick = 99;
 
-  ASSERT_EQ(producer_.pushRun(timed, bodies(10, 3).data(), 3, 0), 3u);
+  ASSERT_EQ(producer_.pushRun(timed, bodies(10, 3).data(), 3, 0, [](auto) {}), 3u);
 
   for (const auto tick : {99u, 0u, 0u}) {
     EXPECT_EQ(consumer_.begin().sentTick, tick);
