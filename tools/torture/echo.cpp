@@ -5,6 +5,7 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <fmt/format.h>
 #include <utility>
@@ -17,6 +18,7 @@ namespace {
 constexpr auto kBoardInterval = std::chrono::milliseconds(2);  // between two reads of the board
 constexpr std::uint32_t kNewEvery = 3;  // every third array gets a new message as its reply
 constexpr std::uint32_t kPublishEvery = 2;  // every second of these is published
+constexpr std::size_t kValues = 24;  // of an answer with many values: several runs
 
 }  // namespace
 
@@ -60,9 +62,21 @@ void Echo::answer(Int32Message&& request) {
   if (!note(request->value, request->address == answerTo(request->value))) return;
   if (request->cmd == static_cast<std::int32_t>(Request::die)) ::raise(SIGKILL);
   request->value = answerTo(request->value);
+  if (request->cmd == static_cast<std::int32_t>(Request::answerMany)) return answerMany(request);
   Message now = std::move(request);
   if (now.tryAs<Int32>()->cmd == static_cast<std::int32_t>(Request::keep)) std::swap(now, kept_);
   if (now) send(std::move(now));
+}
+
+// The further values are dropped where the client's ring is full.
+void Echo::answerMany(const Int32Message& answer) {
+  std::array<Int32, kValues> values;
+  for (std::size_t i = 0; i < kValues; ++i) {
+    values[i] = *answer;
+    values[i].extra = static_cast<std::int32_t>(i);
+  }
+  const auto sent = server_.replyMany<Int32>(answer, values);
+  if (sent.count == 0) check(sent.result);
 }
 
 void Echo::answer(Float64ArrayMessage&& request) {

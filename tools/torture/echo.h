@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Echo: the servers of `mpf torture`. It checks every byte of each request, and answers in place,
-// with a new message, with a published one, or late.
+// with a new message, with a published one, with many values, or late.
 //
 // Threads  one.
 #pragma once
@@ -25,6 +25,7 @@ class Echo {
  private:
   void handle(Message&& request);
   void answer(Int32Message&& request);
+  void answerMany(const Int32Message& answer);
   void answer(Float64ArrayMessage&& request);
   void send(Message&& reply);
   void check(ReplyResult result);

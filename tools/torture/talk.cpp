@@ -30,6 +30,8 @@ Talk::Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::stri
       talked_(talked),
       random_(seed),
       client_(dispatcher, [this](const Message& message) { take(message); }) {
+  client_.onValues<Int32>(
+      [this](std::span<const Int32> values, const Message& first) { takeValues(values, first); });
   client_.bind(server, 0);
 }
 
@@ -69,6 +71,10 @@ Message Talk::makeMessage(std::int32_t value) {
       return makeArray(value, kLarge, false);
     case 6:
       return Int32Message({.cmd = static_cast<std::int32_t>(Request::keep),
+                           .address = answerTo(value),
+                           .value = value});
+    case 7:
+      return Int32Message({.cmd = static_cast<std::int32_t>(Request::answerMany),
                            .address = answerTo(value),
                            .value = value});
     default:
@@ -114,6 +120,24 @@ void Talk::take(const Message& message) {
   open_.erase(found);
   if (fate != nullptr) return takeFate(value, fate->fate);
   takeReply(value, message);
+}
+
+// A server sends all values of one answer before it answers another request. The first value does
+// not arrive if the request has had its fate.
+void Talk::takeValues(std::span<const Int32> values, const Message& first) {
+  const bool endsRequest = (first.route().flags & kEndsRequest) != 0;
+  if (endsRequest) take(first);
+  if (const auto id = first.route().requestId; std::exchange(lastId_, id) != id) {
+    last_ = values.front();
+    if (last_.extra != (endsRequest ? 0 : 1))
+      world_.complain(fmt::format("an answer begins with value {}", last_.extra));
+    values = values.subspan(1);
+  }
+  for (const auto& value : values) {
+    if (value.value != last_.value || value.extra != ++last_.extra)
+      world_.complain(fmt::format("value {} of the answer {} does not follow its former one",
+                                  value.extra, value.value));
+  }
 }
 
 void Talk::takeConnect(ConnectStatus status) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Talk: the messages of one client to one server: requests of all sizes, some of them kept, expired
-// or cancelled. It checks that each request ends exactly once: with its own reply, or with a true
-// fate.
+// Talk: the messages of one client to one server: requests of all sizes, some of them kept,
+// expired, cancelled, or answered with many values. It checks that each request ends exactly once:
+// with its own reply, or with a true fate; and that the values of an answer are in order.
 //
 // Threads  the dispatcher's.
 #pragma once
@@ -22,6 +22,7 @@ enum class Request : std::int32_t {
   answer = 1,
   keep = 2,  // answer when the next such request arrives, or drop it
   die = 3,  // the server kills itself
+  answerMany = 4,  // answer with many values, numbered in `extra`
 };
 
 class Talk {
@@ -45,6 +46,7 @@ class Talk {
   [[nodiscard]] Message makeMessage(std::int32_t value);
   [[nodiscard]] Message makeArray(std::int32_t value, std::size_t length, bool inPool);
   void take(const Message& message);
+  void takeValues(std::span<const Int32> values, const Message& first);
   void takeConnect(ConnectStatus status);
   void takeFate(std::int32_t value, Fate fate);
   void takeReply(std::int32_t value, const Message& reply);
@@ -54,6 +56,8 @@ class Talk {
   std::mt19937 random_;
   std::map<std::uint32_t, std::int32_t> open_;  // values by request id
   bool losing_ = false;
+  std::uint32_t lastId_ = 0;  // of the last Int32
+  Int32 last_{};
   MessageClient client_;  // last: its callback uses the rest
 };
 
