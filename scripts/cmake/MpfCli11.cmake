@@ -12,6 +12,7 @@ if(NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU OR NOT EXISTS "${include}/CLI/CLI.hpp"
 endif()
 
 file(GLOB headers "${include}/CLI/*.hpp")
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${headers})
 set(copies "${CMAKE_BINARY_DIR}/generated/cli11")
 set(source "#include <CLI/CLI.hpp>\n")
 foreach(header IN LISTS headers)

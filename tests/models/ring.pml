@@ -19,6 +19,8 @@
 //   BREAK   FREED_EARLY        slots are freed before they are read
 //   BREAK   ONE_SLOT_TOO_MANY  the producer uses one slot that is not free
 //   BREAK   TAKEN_LATE         a message is counted as taken after the consumer has looked at it
+//   BREAK   SECOND_UNSEEN      of two messages that are taken together, only the first is known to be
+//                              complete
 //   BREAK   TAKEN_IN_PART      of two messages that are taken together, only one is counted before
 //                              the consumer has looked at both
 #define CAPACITY 4
@@ -108,8 +110,13 @@ judge:
 #define hasMessage (memory[SEQUENCE(taken)] == taken + 1)
 
 // Two messages of one slot, of which the consumer has seen only the envelopes.
+#ifdef SECOND_UNSEEN
+#define isFilled(position) true
+#else
+#define isFilled(position) (memory[SEQUENCE(position)] == position + 1)
+#endif
 #define hasTwo \
-  (hasMessage && memory[SEQUENCE(taken + 1)] == taken + 2 && memory[BODY(taken)] % 2 == 0 && \
+  (hasMessage && isFilled(taken + 1) && memory[BODY(taken)] % 2 == 0 && \
    memory[BODY(taken + 1)] % 2 == 0)
 
 inline look() {

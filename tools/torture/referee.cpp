@@ -41,11 +41,17 @@ bool isOrderly(int status) { return WIFEXITED(status) && WEXITSTATUS(status) == 
 const char* toString(Role role) noexcept { return role == Role::client ? "client" : "server"; }
 const char* toString(Mode mode) noexcept { return mode == Mode::kill ? "kill" : "stop"; }
 
+// A process that an actor left (Sabotage::keepName) ends soon after the others. It is not a child
+// of this process, so this waits until its segments can be removed.
+TemporaryBackplane::~TemporaryBackplane() {
+  const auto backplane = Backplane::named(name_);
+  const auto patience = Deadline::after(std::chrono::seconds(5));
+  do static_cast<void>(backplane.removeDead());
+  while (!backplane.segmentNames().empty() && !patience.hasPassed());
+}
+
 Referee::Referee(const Marks& marks, const Options& options)
-    : marks_(marks),
-      options_(options),
-      backplane_(Backplane::isolated().name()),
-      random_(options.seed) {
+    : marks_(marks), options_(options), random_(options.seed) {
   steady_ = processes_.start([cast = cast()] { return playSteady(cast); });
   survivor_ = processes_.start([cast = cast()] { return playSurvivor(cast); });
   startMortal();
@@ -53,19 +59,8 @@ Referee::Referee(const Marks& marks, const Options& options)
           [&] { return repliesOf(0) >= kEnough && repliesOf(1) >= kEnough; });
 }
 
-Referee::~Referee() {
-  (*world_).isOver.store(1);
-  processes_.killAll();
-  // A process that an actor left (Sabotage::keepName) ends soon after. It is not a child of this
-  // process, so this waits until its segments can be removed.
-  const auto backplane = Backplane::named(backplane_);
-  const auto patience = Deadline::after(std::chrono::seconds(5));
-  do static_cast<void>(backplane.removeDead());
-  while (!backplane.segmentNames().empty() && !patience.hasPassed());
-}
-
 Cast Referee::cast() {
-  return {*world_, backplane_, static_cast<std::uint32_t>(random_()), options_.sabotage};
+  return {*world_, backplane_.name(), static_cast<std::uint32_t>(random_()), options_.sabotage};
 }
 
 void Referee::waitFor(const std::string& what, const Condition& condition) {
@@ -200,13 +195,13 @@ void Referee::hold(Role role) {
   const auto& board = boardOf(role);
   const bool leaving = board.leave.load() != 0 || board.isLeaving.load() != 0;
   const auto disconnects = survivor.talked[1].disconnects.load();
-  const auto died = role == Role::client ? clientsDied(backplane_, "steady") : 0;
+  const auto died = role == Role::client ? clientsDied(backplane_.name(), "steady") : 0;
   const auto replies = repliesOf(0);
   waitFor("the survivors continue while a process is stopped",
           [&] { return repliesOf(0) - replies >= kEnough; });
   if (!leaving && survivor.talked[1].disconnects.load() != disconnects)
     throw Broken("a server that was only stopped was reported as dead");
-  if (role == Role::client && clientsDied(backplane_, "steady") != died)
+  if (role == Role::client && clientsDied(backplane_.name(), "steady") != died)
     throw Broken("a client that was only stopped was reported as dead");
   tracee_->release();
 }
@@ -226,13 +221,13 @@ void Referee::settle() {
   std::vector<std::string> stale;
   try {
     waitFor("nothing stale is left", [&] {
-      static_cast<void>(Backplane::named(backplane_).removeDead());
-      return (stale = staleSegments(backplane_, kLinksAtRest)).empty();
+      static_cast<void>(Backplane::named(backplane_.name()).removeDead());
+      return (stale = staleSegments(backplane_.name(), kLinksAtRest)).empty();
     });
   } catch (const Broken& broken) {
     throw Broken(fmt::format("{}; still there: {}", broken.what(), fmt::join(stale, ", ")));
   }
-  checkNoProtocolErrors(backplane_);
+  checkNoProtocolErrors(backplane_.name());
   checkHoldings();
   survivor.rest.store(0);
   waitFor("the survivors continue after a rest", [&] { return survivor.isAtRest.load() == 0; });

@@ -20,6 +20,8 @@
 #include <set>
 #include <string>
 
+#include <mpf/backplane.h>
+
 #include "tools/torture/actors.h"
 #include "tools/torture/checks.h"
 #include "tools/torture/processes.h"
@@ -42,6 +44,19 @@ struct Outcome {
   bool cameToNextMark = false;  // stopped at the next step, before all instructions were executed
 };
 
+// An isolated backplane, whose segments are removed at the end, after their processes have ended.
+class TemporaryBackplane {
+ public:
+  TemporaryBackplane() : name_(Backplane::isolated().name()) {}
+  ~TemporaryBackplane();
+  TemporaryBackplane(const TemporaryBackplane&) = delete;
+  TemporaryBackplane& operator=(const TemporaryBackplane&) = delete;
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+
+ private:
+  std::string name_;
+};
+
 class Referee {
  public:
   struct Options {
@@ -49,10 +64,10 @@ class Referee {
     std::chrono::duration<double> patience{30};  // longest wait for anything that must happen
     Sabotage sabotage = Sabotage::none;
   };
-  // Starts the survivors on a new isolated backplane.
+  // Starts the survivors on a new isolated backplane. At the end all actors are killed, and the
+  // segments that they left are removed.
+  //   throws  Broken when the survivors do not exchange messages
   Referee(const Marks& marks, const Options& options);
-  // Kills all actors and removes the segments that they left.
-  ~Referee();
   Referee(const Referee&) = delete;
   Referee& operator=(const Referee&) = delete;
 
@@ -90,8 +105,9 @@ class Referee {
 
   const Marks& marks_;
   Options options_;
-  std::string backplane_;
   std::mt19937 random_;
+  // In this order, also when the constructor throws: the processes end, then the files are removed.
+  TemporaryBackplane backplane_;
   SharedWorld world_;
   Processes processes_;
   pid_t survivor_ = 0;

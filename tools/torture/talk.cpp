@@ -13,6 +13,8 @@ constexpr std::size_t kSeveralSlots = 9;  // elements of an array that needs sev
 constexpr std::size_t kLarge = 300;       // elements of an array that needs a chunk
 constexpr unsigned kCancelEvery = 32;
 constexpr unsigned kBurstEvery = 16;
+constexpr const char* kNoRequest =
+    "a reply or fate arrived for a request that had ended or was never sent";
 constexpr std::size_t kBurst = 80;  // open requests whose replies fill the first ring
 
 }  // namespace
@@ -111,9 +113,7 @@ bool Talk::trySendDie() {
 void Talk::take(const Message& message) {
   if (const auto* connect = message.tryAs<Connect>()) return takeConnect(connect->status);
   const auto found = open_.find(message.route().requestId);
-  if (found == open_.end())
-    return world_.complain(
-        "a reply or fate arrived for a request that had ended or was never sent");
+  if (found == open_.end()) return world_.complain(kNoRequest);
   const auto* fate = message.tryAs<RequestFate>();
   if (fate != nullptr && std::exchange(losing_, false)) return;
   const auto value = found->second;
@@ -125,18 +125,23 @@ void Talk::take(const Message& message) {
 // A server sends all values of one answer before it answers another request. The first value does
 // not arrive if the request has had its fate.
 void Talk::takeValues(std::span<const Int32> values, const Message& first) {
-  const bool endsRequest = (first.route().flags & kEndsRequest) != 0;
-  if (endsRequest) take(first);
-  if (const auto id = first.route().requestId; std::exchange(lastId_, id) != id) {
+  const auto id = first.route().requestId;
+  if ((first.route().flags & kEndsRequest) != 0) {
+    take(first);
+    lastId_ = id;
     last_ = values.front();
-    if (last_.extra != (endsRequest ? 0 : 1))
-      world_.complain(fmt::format("an answer begins with value {}", last_.extra));
     values = values.subspan(1);
+  } else if (std::exchange(lastId_, id) != id) {
+    last_ = values.front();
+    last_.extra = 0;
   }
   for (const auto& value : values) {
-    if (value.value != last_.value || value.extra != ++last_.extra)
+    if (value.cmd != static_cast<std::int32_t>(Request::answerMany)) {
+      world_.complain(kNoRequest);
+    } else if (value.value != last_.value || value.extra != ++last_.extra) {
       world_.complain(fmt::format("value {} of the answer {} does not follow its former one",
                                   value.extra, value.value));
+    }
   }
 }
 

@@ -52,6 +52,9 @@ SharedWorld::SharedWorld() {
   world_ = new (memory) World;
 }
 
-SharedWorld::~SharedWorld() { ::munmap(world_, sizeof(World)); }
+SharedWorld::~SharedWorld() {
+  world_->isOver.store(1);
+  ::munmap(world_, sizeof(World));
+}
 
 }  // namespace mpf::torture

@@ -74,7 +74,7 @@ class World {
 class SharedWorld {
  public:
   SharedWorld();
-  ~SharedWorld();
+  ~SharedWorld();  // sets World::isOver
   SharedWorld(const SharedWorld&) = delete;
   SharedWorld& operator=(const SharedWorld&) = delete;
   [[nodiscard]] World& operator*() const noexcept { return *world_; }

@@ -71,6 +71,20 @@ TEST_F(EchoTest, AnswersANumber) {
 }
 
 // Every third array is answered with a new message, the others in their own memory.
+TEST_F(EchoTest, AnswersWithManyValuesInOrder) {
+  auto request = number(Request::answerMany);
+  const auto value = request->value;
+  ASSERT_EQ(client_.send(std::move(request)), SendResult::sent);
+
+  run([&] { return ends_.size() == 24; });
+
+  for (std::size_t i = 0; i < ends_.size(); ++i) {
+    ASSERT_NE(ends_[i].tryAs<Int32>(), nullptr);
+    EXPECT_EQ(ends_[i].tryAs<Int32>()->value, answerTo(value));
+    EXPECT_EQ(ends_[i].tryAs<Int32>()->extra, static_cast<std::int32_t>(i));
+  }
+}
+
 TEST_F(EchoTest, AnswersArraysWithTheirElements) {
   for (int i = 0; i < 4; ++i) {
     auto request = array(300);

@@ -3,6 +3,7 @@
 #include "tools/torture/talk.h"
 
 #include <array>
+#include <fmt/format.h>
 #include <optional>
 #include <set>
 #include <string>
@@ -108,6 +109,24 @@ TEST_F(TalkWithServer, ComplainsOfASecondReply) {
   EXPECT_EQ(complaint(), "a reply or fate arrived for a request that had ended or was never sent");
 }
 
+TEST_F(TalkWithServer, ComplainsOfAValueThatDoesNotFollowItsFormerOne) {
+  const auto request = take<Int32>();
+  Int32 value{.cmd = static_cast<std::int32_t>(Request::answerMany),
+              .value = answerTo(request.tryAs<Int32>()->value)};
+  std::array<Int32, 3> values{value, value, value};
+  for (std::int32_t i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)].extra = i;
+  ASSERT_EQ(server_->replyMany<Int32>(request, values).count, 3U);
+  runUntil([] {}, [&] { return replies() != 0; });
+  EXPECT_EQ(complaint(), "");
+
+  value.extra = 4;
+  ASSERT_EQ(server_->replyMany<Int32>(request, {&value, 1}).count, 1U);
+  runUntil([] {}, [&] { return !complaint().empty(); });
+
+  EXPECT_EQ(complaint(),
+            fmt::format("value 4 of the answer {} does not follow its former one", value.value));
+}
+
 TEST_F(TalkWithServer, ADisconnectEndsAllRequestsAndIsCounted) {
   static_cast<void>(take<Int32>());
   talk_.sendSome();
@@ -169,11 +188,12 @@ TEST_F(TalkWithServer, SendsRequestsOfEachKind) {
           else lengths.insert(request.valueAs<Float64Array>().size());
         }
       },
-      [&] { return lengths.size() == 2 && commands.size() == 2; });
+      [&] { return lengths.size() == 2 && commands.size() == 3; });
 
   EXPECT_EQ(lengths, (std::set<std::size_t>{9, 300}));
   EXPECT_EQ(commands, (std::set<std::int32_t>{static_cast<std::int32_t>(Request::answer),
-                                              static_cast<std::int32_t>(Request::keep)}));
+                                              static_cast<std::int32_t>(Request::keep),
+                                              static_cast<std::int32_t>(Request::answerMany)}));
 }
 
 TEST(TalkArrays, HoldTheElementsOfTheirValueOnly) {

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: MIT
 // `mpf torture`: everything holds when processes are stopped and killed at each step, and the
 // program detects mistakes.
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -89,6 +96,31 @@ TEST_F(TortureTest, AStepThatIsNeverReachedMakesTheVerdictIncomplete) {
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.out,
               AllOf(HasSubstr("never reached: link_created\n"), HasSubstr("\nincomplete: ")));
+}
+
+// In a /dev/shm of its own.
+TEST_F(TortureTest, LeavesNothingIfItFailsAtTheStart) {
+  constexpr int kNotAllowed = 77;
+  const auto child = checkCall(::fork(), "fork");
+  if (child == 0) {
+    const auto user = ::geteuid() == 0 ? 0 : CLONE_NEWUSER;
+    if (::unshare(CLONE_NEWNS | user) != 0) ::_exit(kNotAllowed);
+    ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr);
+    if (::mount("tmpfs", "/dev/shm", "tmpfs", 0, "size=64m") != 0) ::_exit(kNotAllowed);
+
+    const auto ended = torture({"--duration", "0", "--patience", "0.000001"});
+
+    EXPECT_EQ(ended.status, 1);
+    EXPECT_THAT(ended.out, HasSubstr("\nthis did not happen within 1e-06 s: "));
+    EXPECT_TRUE(std::filesystem::is_empty("/dev/shm"));
+    std::fflush(stdout);
+    ::_exit(HasFailure() ? 1 : 0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == kNotAllowed) GTEST_SKIP() << "this host allows no mount namespace";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 // A mistake that a test process makes on purpose, and the complaint that must follow.
