@@ -26,6 +26,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 
 #include <mpf/clock.h>
@@ -97,12 +98,14 @@ class MessageClient {
   //   values  at least one, in the order of the replies; copies, valid until the callback returns
   //   first   the message of the first value. Its clientType, clientExtra and time stamp are those
   //           of all values; if it is the first reply to its request, the request has ended
-  //   throws  std::logic_error when the client is bound already, or has such a callback
+  //   throws  std::invalid_argument when `callback` is empty, std::logic_error when the client is
+  //           bound already, or has such a callback
   // A callback that throws has received all of the values.
   template <ScalarBody T>
   void onValues(std::function<void(std::span<const T> values, const Message& first)> callback) {
     static_assert(T::kType != MessageType::connect && T::kType != MessageType::requestFate);
     static_assert(sizeof(T) <= Message::kInlineBytes);
+    if (!callback) throw std::invalid_argument("MessageClient::onValues(): an empty callback");
     setValueHandler(
         T::kType, sizeof(T),
         [callback = std::move(callback)](std::span<const std::byte> values, const Message& first) {
