@@ -63,6 +63,25 @@ TEST_F(ReplyManyValues, MayBeLongerThanASlotHolds) {
   for (const auto& value : values) EXPECT_EQ(next().tryAs<Float64>()->value, value.value);
 }
 
+// Also when the request has ended, so that only values that fill a slot are left.
+TEST_F(ReplyManyValues, AreRefusedIfTheyAreLongerThanTheServerAllows) {
+  startServer({.maxMessageBytes = sizeof(Int32) - 1});
+  Message request;
+  server_->on<SerialConfig>([&](SerialConfigMessage&& one) { request = std::move(one); });
+  bind();
+  ASSERT_EQ(client_.send(SerialConfigMessage()), SendResult::sent);
+  runUntil([&] { return static_cast<bool>(request); });
+
+  for (const bool isEnded : {false, true}) {
+    const auto sent = server_->replyMany<Int32>(request, readings(2));
+    EXPECT_EQ(sent.count, 0u) << isEnded;
+    EXPECT_EQ(sent.result, ReplyResult::tooLarge) << isEnded;
+    const std::array<SerialConfig, 1> allowed{};
+    ASSERT_EQ(server_->replyMany<SerialConfig>(request, allowed).count, 1u);
+    EXPECT_EQ(next().getType(), MessageType::serialConfig);
+  }
+}
+
 // Near its end a full ring has no room for both slots of a Float64, and the body goes into a chunk:
 // a new one, although the values themselves lie in one that could be sent.
 TEST_F(ReplyManyValues, StayWithTheCallerIfTheyLieInAChunk) {

@@ -1,97 +1,16 @@
 // SPDX-License-Identifier: MIT
-// MessageClient::onValues(): replies that are delivered together.
+// MessageClient::onValues(): which replies are delivered together.
 #include <poll.h>
 
+#include <array>
 #include <cstring>
-#include <functional>
-#include <stdexcept>
-#include <utility>
-#include <vector>
 
-#include "tests/client/client_fixture.h"
+#include "tests/client/value_runs_fixture.h"
 
 namespace mpf::test {
 namespace {
 
 using testing::ElementsAre;
-
-class ValueRuns : public ClientTest {
- protected:
-  // What one call of the callback received.
-  struct Run {
-    std::vector<std::int32_t> values;
-    std::int32_t clientType;
-    std::int32_t clientExtra;
-    std::int64_t timeStampNs;
-    bool endsRequest;
-    std::size_t otherMessages;  // that arrived before
-    std::size_t news;  // the same, of connections
-  };
-  void SetUp() override {
-    client_.onValues<Int32>([this](std::span<const Int32> values, const Message& first) {
-      Run run{{},
-              first.getClientType(),
-              first.getClientExtra(),
-              first.getTimeStampNs(),
-              (first.route().flags & kEndsRequest) != 0,
-              messages_.size(),
-              news_.size()};
-      for (const auto& each : values) run.values.push_back(each.value);
-      received_ += values.size();
-      runs_.push_back(std::move(run));
-      if (onCall_) onCall_(values, first);
-      if (mustThrow_) throw std::runtime_error("the callback throws");
-    });
-  }
-  static std::vector<Int32> readings(std::int32_t count, std::int32_t first = 0) {
-    std::vector<Int32> values;
-    for (std::int32_t i = 0; i < count; ++i) values.push_back({.value = first + i});
-    return values;
-  }
-  void receive(std::size_t values) {
-    runUntil([&] { return received_ >= values; });
-    EXPECT_EQ(received_, values);
-  }
-  [[nodiscard]] std::vector<std::vector<std::int32_t>> valuesOfRuns() const {
-    std::vector<std::vector<std::int32_t>> all;
-    for (const auto& run : runs_) all.push_back(run.values);
-    return all;
-  }
-  void reply(const Message& request, std::int32_t value, std::int64_t timeStampNs = 0) {
-    auto message = server_->allocReplyMessage<Int32>(request);
-    message->value = value;
-    message.setTimeStampNs(timeStampNs);
-    ASSERT_EQ(server_->reply(std::move(message)), ReplyResult::sent);
-  }
-  // Messages whose time in the queue is known, in all windows of clients.
-  [[nodiscard]] std::uint64_t timedMessages() const {
-    std::uint64_t sum = 0;
-    for (const auto& name : backplane_.segmentNames()) {
-      const auto parsed = SegmentName::tryParse(name);
-      if (!parsed || parsed->kind != NameKind::clientWindow) continue;
-      const auto window = PeerWindow::tryOpen(name, layout::SegmentKind::clientWindow);
-      for (const auto& bucket : window->control().queueWaitNs.buckets)
-        sum += bucket.load(std::memory_order_relaxed);
-    }
-    return sum;
-  }
-  // A request of this client, after heldRequest().
-  Message another(std::int32_t clientType) {
-    const auto held = std::make_shared<Message>();
-    server_->on<Int32>([held](Int32Message&& request) { *held = std::move(request); });
-    Int32Message request;
-    request.setClientType(clientType);
-    request.setClientExtra(-clientType);
-    EXPECT_EQ(client_.send(std::move(request)), SendResult::sent);
-    runUntil([&] { return static_cast<bool>(*held); });
-    return std::move(*held);
-  }
-
-  std::vector<Run> runs_;
-  std::size_t received_ = 0;
-  bool mustThrow_ = false;
-  std::function<void(std::span<const Int32>, const Message&)> onCall_;
-};
 
 TEST_F(ValueRuns, ArriveInOrderWithFewCalls) {
   startServer({.queueSize = 256});
@@ -182,6 +101,26 @@ TEST_F(ValueRuns, EndWhereTheTimeStampChanges) {
   EXPECT_EQ(runs_[1].timeStampNs, 6);
 }
 
+TEST_F(ValueRuns, HaveTheTimeOfTheirSendingIfTheServerStampsReplies) {
+  startServer({.stampsReplies = true});
+  const auto request = heldRequest();
+  const auto startNs = Clock::wallNs();
+
+  ASSERT_EQ(server_->replyMany<Int32>(request, readings(10)).count, 10u);
+  const auto sentNs = Clock::wallNs();
+  receive(10);
+
+  std::int32_t next = 0;
+  for (const auto& run : runs_) {
+    EXPECT_GE(run.timeStampNs, startNs);
+    EXPECT_LE(run.timeStampNs, sentNs);
+    for (const auto value : run.values) EXPECT_EQ(value, next++);
+  }
+  // The first value, which ends the request, is sent alone; the others may lie around the end of a
+  // batch of slots.
+  EXPECT_LE(runs_.size(), 3u);
+}
+
 TEST_F(ValueRuns, OfAFullRingArriveInOrderAroundItsEnd) {
   startServer({.queueSize = 2});
   const auto request = heldRequest();
@@ -206,22 +145,6 @@ TEST_F(ValueRuns, CountAsReceivedMessages) {
   receive(50);
 
   EXPECT_EQ(sumOf(&layout::WindowControl::received), before + 50);
-}
-
-TEST_F(ValueRuns, AreDeliveredEvenIfTheCallbackThrows) {
-  startServer();
-  const auto request = heldRequest();
-  ASSERT_EQ(server_->replyMany<Int32>(request, readings(8)).count, 8u);
-  mustThrow_ = true;
-  EXPECT_THROW(receive(8), std::runtime_error);
-  mustThrow_ = false;
-
-  ASSERT_EQ(server_->replyMany<Int32>(request, readings(8, 8)).count, 8u);
-  receive(16);
-
-  std::int32_t next = 0;
-  for (const auto& run : runs_)
-    for (const auto value : run.values) EXPECT_EQ(value, next++);
 }
 
 // Longer values than a slot holds come one by one.
@@ -260,28 +183,6 @@ TEST_F(ValueRuns, DoNotContainInvalidBodies) {
 
   EXPECT_FALSE(next().isSound());
   EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(1), ElementsAre(2)));
-}
-
-TEST_F(ValueRuns, MayDestroyTheirClient) {
-  startServer();
-  std::vector<std::int32_t> values;
-  auto other = std::make_unique<MessageClient>(dispatcher_, [](const Message&) {});
-  other->onValues<Int32>([&](std::span<const Int32> run, const Message&) {
-    other.reset();
-    for (const auto& each : run) values.push_back(each.value);
-  });
-  Message request;
-  server_->on<Int32>([&](Int32Message&& one) { request = std::move(one); });
-  other->bind("device[0]/a");
-  runUntil([&] { return other->isConnected(); });
-  ASSERT_EQ(other->send(Int32Message()), SendResult::sent);
-  runUntil([&] { return static_cast<bool>(request); });
-
-  ASSERT_EQ(server_->replyMany<Int32>(request, readings(30)).count, 30u);
-  runUntil([&] { return !values.empty(); });
-
-  EXPECT_EQ(other, nullptr);
-  EXPECT_LT(values.size(), 30u);
 }
 
 // Such a body is a valid Int32 in shared memory, which the server may change.
@@ -334,14 +235,6 @@ TEST_F(ValueRuns, OfAServerThatEndsArriveBeforeTheDisconnect) {
     EXPECT_EQ(run.news, 1u);
     for (const auto value : run.values) EXPECT_EQ(value, next++);
   }
-}
-
-TEST_F(ValueRuns, NeedTheirCallbackOnceAndBeforeBind) {
-  EXPECT_THROW(client_.onValues<Float64>({}), std::logic_error) << "there is one for Int32";
-
-  MessageClient other(dispatcher_, [](const Message&) {});
-  other.bind("device[0]/a");
-  EXPECT_THROW(other.onValues<Int32>({}), std::logic_error);
 }
 
 }  // namespace

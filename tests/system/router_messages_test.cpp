@@ -147,6 +147,36 @@ TEST_F(RouterMessagesTest, OneRequestMayHaveManyRepliesOfAnyType) {
   for (const auto* reply : {&first, &second, &third}) EXPECT_EQ(reply->route().requestId, id);
 }
 
+// The client receives values in runs also from a router, which sends them one by one.
+TEST_F(RouterMessagesTest, ManyValuesOfOneRequestArriveInOrder) {
+  constexpr std::int32_t kValues = 2000;
+  std::vector<std::int32_t> received;
+  MessageClient client(*dispatcher_, [](const Message&) {});
+  client.onValues<Int32>([&](std::span<const Int32> values, const Message& first) {
+    EXPECT_EQ(first.getClientType(), 7);
+    for (const auto& each : values) received.push_back(each.value);
+  });
+  client.bind("echo", RouterPair::kLocation);
+  runUntil([&] { return client.isConnected(); });
+  Int32Message message;
+  message.setClientType(7);
+  ASSERT_EQ(client.send(std::move(message)), SendResult::sent);
+  const auto request = nextRequest();
+  std::vector<Int32> values;
+  for (std::int32_t i = 0; i < kValues; ++i) values.push_back({.value = i});
+
+  std::span<const Int32> rest = values;
+  runUntil([&] {
+    const auto sent = server_->replyMany<Int32>(request, rest);
+    EXPECT_TRUE(sent.result == ReplyResult::sent || sent.result == ReplyResult::queueFull);
+    rest = rest.subspan(sent.count);
+    return received.size() >= values.size();
+  });
+
+  ASSERT_EQ(received.size(), values.size());
+  for (std::int32_t i = 0; i < kValues; ++i) EXPECT_EQ(received[static_cast<std::size_t>(i)], i);
+}
+
 // A subscription: after a request has ended, its client gets further messages between the replies
 // to other requests.
 TEST_F(RouterMessagesTest, AServerMaySendFurtherMessagesAfterItsReply) {
