@@ -17,15 +17,14 @@ JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
 # Many tests mostly wait.
 CTEST_FLAGS ?= --parallel $(shell expr 4 \* $(JOBS))
-PRESETS := release debug edit asan tsan
-TESTED := debug edit asan tsan
+PRESETS := release tests edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
 .PHONY: bench-peers
 .PHONY: startup-files install container wheel python-reference epics-base-tsan
-.PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
+.PHONY: format format-check tidy clean $(PRESETS) test-edit test-asan test-tsan
 
 help: ## print this list
 	@sed -nE 's/^([a-z][a-z0-9-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 24
@@ -38,29 +37,30 @@ demo: release ## a voltmeter through crashes, modules that are wired together, a
 	./examples/demo/hardware build/release
 	./examples/demo/ioc build/release
 
-test: test-debug ## build with debug information and run every test
+test: tests ## build and run every test
+	ctest --preset tests $(CTEST_FLAGS) $(if $(TESTS),--tests-regex '$(TESTS)')
 
-test-repeated: debug ## run all tests in parallel copies, repeatedly (COPIES=6 ROUNDS=20)
-	scripts/repeat-tests build/debug --copies $(or $(COPIES),6) --rounds $(or $(ROUNDS),20) \
+test-repeated: tests ## run all tests in parallel copies, repeatedly (COPIES=6 ROUNDS=20)
+	scripts/repeat-tests build/release --copies $(or $(COPIES),6) --rounds $(or $(ROUNDS),20) \
 		$(if $(TESTS),--tests '$(TESTS)')
 
-test-big-endian: debug ## exchange messages with an emulated big-endian host
+test-big-endian: tests ## exchange messages with an emulated big-endian host
 	@scripts/setup big-endian
 	@scripts/big-endian-sysroot
 	@cmake --preset big-endian --log-level=NOTICE
 	cmake --build --preset big-endian --parallel $(JOBS)
 	ctest --preset big-endian $(CTEST_FLAGS)
 	MPF_TEST_BIG_ENDIAN="$(CURDIR)/build/big-endian" \
-		ctest --preset debug $(CTEST_FLAGS) --label-regex '^byte_order_test$$'
+		ctest --preset tests $(CTEST_FLAGS) --label-regex '^byte_order_test$$'
 
-test-tpci200: debug ## test the PCI carrier and its octal UARTs in an emulated machine
+test-tpci200: tests ## test the PCI carrier and its octal UARTs in an emulated machine
 	@scripts/setup tpci200
-	@scripts/tpci200-machine make build/debug
-	MPF_TEST_TPCI200="$(CURDIR)/build/debug" \
-		ctest --preset debug $(CTEST_FLAGS) --label-regex '^tpci200_test$$'
+	@scripts/tpci200-machine make build/release
+	MPF_TEST_TPCI200="$(CURDIR)/build/release" \
+		ctest --preset tests $(CTEST_FLAGS) --label-regex '^tpci200_test$$'
 
-soak: debug ## check memory and descriptors in hours of traffic with killed clients (DURATION=2h)
-	build/debug/bin/mpf_test_soak $(or $(DURATION),2h)
+soak: tests ## check memory and descriptors in hours of traffic with killed clients (DURATION=2h)
+	build/release/bin/mpf_test_soak $(or $(DURATION),2h)
 
 fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FUZZERS=tools)
 	@scripts/setup fuzz
@@ -114,15 +114,15 @@ tidy: ## run clang-tidy on changed sources (FOLDERS="shm router": only these)
 clean: ## remove build/
 	$(RM) -r build
 
-# make release, debug, edit, asan, tsan: builds with that preset. make test-asan: also runs its
-# tests.
+# make release: what is installed; make tests: and the tests; make edit, asan, tsan: both, with that
+# preset. make test-edit, test-asan, test-tsan: also runs the tests.
 $(PRESETS): setup
-	@cmake --preset $@ --log-level=NOTICE
+	@cmake --preset $(@:tests=release) --log-level=NOTICE
 	cmake --build --preset $@ --parallel $(JOBS)
 
 tsan: epics-base-tsan
 epics-base-tsan: setup
 	@scripts/epics-base-tsan
 
-$(TESTED:%=test-%): test-%: %
+test-edit test-asan test-tsan: test-%: %
 	ctest --preset $* $(CTEST_FLAGS) $(if $(TESTS),--tests-regex '$(TESTS)')

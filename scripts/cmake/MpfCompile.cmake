@@ -59,12 +59,15 @@ if(MPF_SANITIZE STREQUAL thread)
   target_compile_options(mpf_warnings INTERFACE -Wno-tsan)
 endif()
 
-# Each build links some fifty programs. GNU ld needs a second for each, mold a fraction of that.
-# Release builds use the default linker.
+# The tests are some hundred programs. GNU ld needs a second for each, mold a fraction of that.
+# Programs that are installed use the default linker.
 find_program(MPF_MOLD mold)
-if(MPF_MOLD AND CMAKE_BUILD_TYPE STREQUAL Debug AND CMAKE_CXX_COMPILER_ID STREQUAL GNU
-    AND NOT CMAKE_CROSSCOMPILING)
-  add_link_options(-fuse-ld=mold)
+set(fastLinker "")
+if(MPF_MOLD AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CROSSCOMPILING)
+  set(fastLinker -fuse-ld=mold)
+endif()
+if(CMAKE_BUILD_TYPE STREQUAL Debug)
+  add_link_options(${fastLinker})
 endif()
 
 find_program(MPF_CCACHE ccache)

@@ -2,13 +2,14 @@
 # and their man pages.
 include(CMakePackageConfigHelpers)
 
-# Appends to `out` the targets of `type` that the CMakeLists of `folder` and below define.
+# Appends to `out` the targets that the CMakeLists of `folder` and below define, if their type is
+# `type`, a regular expression.
 function(mpf_find_targets out folder type)
   get_property(targets DIRECTORY "${folder}" PROPERTY BUILDSYSTEM_TARGETS)
   get_property(subfolders DIRECTORY "${folder}" PROPERTY SUBDIRECTORIES)
   foreach(target IN LISTS targets)
     get_target_property(targetType ${target} TYPE)
-    if(targetType STREQUAL type)
+    if(targetType MATCHES "^(${type})$")
       list(APPEND ${out} ${target})
     endif()
   endforeach()
