@@ -7,7 +7,8 @@
 #   DURATION=t  of `make soak`: 30s, 10m, 2h; of `make fuzz`: seconds
 #   FUZZERS=... only these fuzzers: client, server, tools, recording, frames, startup,
 #               server_router, client_router
-#   TESTS=regex only the tests whose name matches
+#   TESTS=regex only the tests whose name matches; with a sanitizer a name is that of a part of an
+#               executable, such as shm_test.0
 #   COPIES=n    of `make test-repeated`: number of parallel runs of all tests (default 6)
 #   ROUNDS=n    of `make test-repeated`: how many times (default 20)
 #   PYTHONS=... interpreters of `make wheel` (default: python3)
@@ -29,10 +30,10 @@ SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-sta
 help: ## print this list
 	@sed -nE 's/^([a-z][a-z0-9-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 24
 
-setup: ## install the Debian packages that are missing (every other target calls it)
+setup: ## install the Debian packages that are missing (targets that build call it)
 	@scripts/setup
 
-demo: release ## a voltmeter through crashes, modules that are wired together, an EPICS IOC
+demo: release ## run a voltmeter whose server is killed, wired modules, an EPICS IOC
 	./examples/demo/run build/release
 	./examples/demo/hardware build/release
 	./examples/demo/ioc build/release
@@ -114,8 +115,15 @@ tidy: ## run clang-tidy on changed sources (FOLDERS="shm router": only these)
 clean: ## remove build/
 	$(RM) -r build
 
-# make release: what is installed; make tests: and the tests; make edit, asan, tsan: both, with that
-# preset. make test-edit, test-asan, test-tsan: also runs the tests.
+release: ## build what is installed
+tests: ## build what is installed, and the tests
+edit: ## build programs and tests for a debugger
+asan: ## build programs and tests with AddressSanitizer and UndefinedBehaviorSanitizer
+tsan: ## build programs and tests with ThreadSanitizer
+test-edit: ## build and run the tests of `edit`
+test-asan: ## build and run the tests of `asan`
+test-tsan: ## build and run the tests of `tsan`
+
 $(PRESETS): setup
 	@cmake --preset $(@:tests=release) --log-level=NOTICE
 	cmake --build --preset $@ --parallel $(JOBS)

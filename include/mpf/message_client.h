@@ -87,10 +87,10 @@ class MessageClient {
   //           client is already bound
   void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
 
-  // Sets the callback for valid replies of type T, once and before bind(). Replies that follow one
-  // another arrive together, up to 16 at a time, if they belong to the same request and have the
-  // same time stamp, and T is Int32 or OutOfBand; otherwise one by one. All other messages go to
-  // the callback of the constructor.
+  // Sets the callback for replies of type T whose body is valid. Call it once, before bind().
+  // Consecutive replies to one request with one time stamp arrive together, up to 16 at a time, if
+  // T is Int32 or OutOfBand; other types arrive one by one. All other messages go to the callback
+  // of the constructor.
   //
   //   client.onValues<mpf::Int32>(
   //       [&](std::span<const mpf::Int32> values, const mpf::Message& first) { ... });
@@ -99,7 +99,7 @@ class MessageClient {
   //   first   the message of the first value. Its clientType, clientExtra and time stamp are those
   //           of all values; if it is the first reply to its request, the request has ended
   //   throws  std::invalid_argument when `callback` is empty, std::logic_error when the client is
-  //           bound already, or has such a callback
+  //           bound already, or onValues() was called before, for any type
   // A callback that throws has received all of the values.
   template <ScalarBody T>
   void onValues(std::function<void(std::span<const T> values, const Message& first)> callback) {

@@ -63,9 +63,9 @@ struct ServerOptions {
 // The result of a reply.
 enum class ReplyResult {
   sent,
-  clientGone,  // the client has disconnected or died, or the message is no reply
+  clientGone,  // the client has disconnected or died, or the message is not a reply
   queueFull,  // further replies only: the client has not received the earlier ones yet; publish()
-  // only: it holds ServerOptions::maxBorrowed published messages
+  // only: the client holds ServerOptions::maxBorrowed published messages
   tooLarge,  // larger than ServerOptions::maxMessageBytes
   noMemory  // the shared memory of the connection, that of publish(), or /dev/shm, is full
 };
@@ -74,7 +74,7 @@ enum class ReplyResult {
 
 // The result of MessageServer::replyMany().
 struct RepliedMany {
-  std::size_t count = 0;  // replies sent; with messages, also those whose client is gone
+  std::size_t count = 0;  // replies sent; of messages, also those whose client is gone
   ReplyResult result = ReplyResult::sent;  // why the next one was not sent; `sent` when all were
 };
 
@@ -141,9 +141,10 @@ class MessageServer {
   // it unchanged. The first reply ends the request. Further replies are refused with queueFull when
   // the client does not receive them. Any thread; never waits.
   ReplyResult reply(Message&& message);
-  // Sends replies in order, as reply() does, until one is not sent for another reason than
-  // clientGone. A client that sleeps is woken once at most for the replies to it that follow one
-  // another. Replies that were counted are empty then; the others are unchanged.
+  // Sends replies in order, as reply() does, and stops at the first that is not sent. Those whose
+  // client is gone are skipped and counted. A client that sleeps is woken once at most for the
+  // replies to it that follow one another. Replies that were counted are empty then; the others are
+  // unchanged.
   // Any thread; never waits.
   RepliedMany replyMany(std::span<Message> replies) noexcept;
   // Sends each of `values` as a reply to `request`, in order, until one is not sent: for a server
@@ -154,7 +155,7 @@ class MessageServer {
   // The first reply ends the request, as with reply(). A client that sleeps is woken once for up to
   // 1024 values. Any thread; never waits.
   //   request  stays with the caller, who can reply to it again
-  //   values   with ServerOptions::stampsReplies, many of them get the same time stamp
+  //   values   with ServerOptions::stampsReplies, up to 1024 consecutive ones share a time stamp
   //   returns  the number of values that were sent; `result` is clientGone when the client is gone
   template <ScalarBody T>
   RepliedMany replyMany(const Message& request, std::span<const T> values) noexcept {
@@ -173,8 +174,8 @@ class MessageServer {
 
   // Returns an array of n elements, fields 0, elements not initialised, in memory that all clients
   // of this server can read and only the server can write; on the heap when that memory is full.
-  // The memory is free again when the handle and those of all clients are destroyed, and when a
-  // client that holds one is killed. Do not write to the message after it was published: clients
+  // The memory is free again when the server and all clients have destroyed their handles; a client
+  // that was killed holds none. Do not write to the message after it was published: clients
   // would see it change.
   //   throws  std::bad_alloc; std::length_error when n is above 2^32 - 1
   template <ArrayBody T>
@@ -193,7 +194,7 @@ class MessageServer {
   // Message::getMissed().
   //
   //   message   keeps its contents, and may be published again, to these or other requests
-  //   requests  unchanged; a request of another server, and an empty handle, is a clientGone
+  //   requests  unchanged; a request of another server, or an empty handle, gives clientGone
   //   results   out: the result for each request; may be shorter, and is then filled as far as it
   //             goes
   //   returns   the number of results `sent`

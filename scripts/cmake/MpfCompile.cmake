@@ -8,13 +8,13 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 # All programs are in one folder, where the demo, the tests and `make bench` find them.
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
-# Public headers are included as users do: <mpf/message.h>. All others are named from
-# the root: "shm/link.h".
 # Fields of messages are stored one by one and loaded soon afterwards. A vector load of several
 # fields would have to wait until their stores have reached the cache.
 add_compile_options(-fno-tree-slp-vectorize)
 # Code for shared libraries, too, calls the functions of its own source file directly.
 add_compile_options(-fno-semantic-interposition)
+# Public headers are included as users do: <mpf/message.h>. All others are named from the root:
+# "shm/link.h".
 add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}"
   "SHELL:-iquote ${CMAKE_BINARY_DIR}/generated")
 
@@ -59,7 +59,7 @@ if(MPF_SANITIZE STREQUAL thread)
   target_compile_options(mpf_warnings INTERFACE -Wno-tsan)
 endif()
 
-# The tests are some hundred programs. GNU ld needs a second for each, mold a fraction of that.
+# The tests are about a hundred programs. GNU ld needs a second for each, mold a fraction of that.
 # Programs that are installed use the default linker.
 find_program(MPF_MOLD mold)
 set(fastLinker "")
