@@ -49,6 +49,12 @@ class ValueRuns : public ClientTest {
     runUntil([&] { return received_ >= values; });
     EXPECT_EQ(received_, values);
   }
+  // The values received are 0, 1, 2 and so on.
+  void expectNumbered() const {
+    std::int32_t next = 0;
+    for (const auto& run : runs_)
+      for (const auto value : run.values) ASSERT_EQ(value, next++);
+  }
   [[nodiscard]] std::vector<std::vector<std::int32_t>> valuesOfRuns() const {
     std::vector<std::vector<std::int32_t>> all;
     for (const auto& run : runs_) all.push_back(run.values);

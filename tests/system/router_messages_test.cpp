@@ -147,7 +147,7 @@ TEST_F(RouterMessagesTest, OneRequestMayHaveManyRepliesOfAnyType) {
   for (const auto* reply : {&first, &second, &third}) EXPECT_EQ(reply->route().requestId, id);
 }
 
-// The client receives values in runs also from a router, which sends them one by one.
+// A router sends the values one by one, while the server sends faster than the client takes them.
 TEST_F(RouterMessagesTest, ManyValuesOfOneRequestArriveInOrder) {
   constexpr std::int32_t kValues = 2000;
   std::vector<std::int32_t> received;
