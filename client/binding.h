@@ -28,6 +28,8 @@
 
 namespace mpf {
 
+class ValueRun;
+
 class Binding final : public LinkUser, public std::enable_shared_from_this<Binding> {
  public:
   Binding(DispatcherParts& parts, MessageClient::Callback callback)
@@ -45,6 +47,10 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
                     std::span<std::uint32_t> requestIds) noexcept {
     return sender_.sendMany(messages, takeBefore, requestIds);
+  }
+  SentMany sendBodies(const Bodies& bodies, Deadline takeBefore,
+                      std::span<std::uint32_t> requestIds) noexcept {
+    return sender_.sendBodies(bodies, takeBefore, requestIds);
   }
   BodyBytes allocate(std::size_t bytes) { return sender_.allocate(bytes); }
   [[nodiscard]] bool isConnected() const noexcept { return state() == BindingState::connected; }
@@ -140,6 +146,10 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   void noteTimes(std::uint32_t sentTick, const Request* request) noexcept;
   void deliver(Message&& message);
   void deliverValues(const Message& first);
+  void takeFurtherReplies(const Message& first, ValueRun& run) noexcept;
+  void takeFirstReplies(const Message& first, ValueRun& run) noexcept;
+  template <class Accept>
+  void takeValues(ValueRun& run, const Accept& accept) noexcept;
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   void deliverFate(const UntakenRequest& request, Fate fate);

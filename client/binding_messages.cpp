@@ -6,6 +6,7 @@
 #include "base/step.h"
 #include "client/binding.h"
 #include "shm/histogram.h"
+#include "shm/messages/value_run.h"
 
 namespace mpf {
 namespace {
@@ -23,6 +24,17 @@ bool mayServerSend(const Message& message, const Request* request) noexcept {
   const auto* fate = message.tryAs<RequestFate>();
   return fate != nullptr && request != nullptr &&
          fate->requestId == request->id.load(std::memory_order_relaxed);
+}
+
+// The envelope of the messages that are like `first` and fill a slot.
+EnvelopeWords wordsOf(const Message& first, std::uint8_t flags) noexcept {
+  return EnvelopeWords::of({.type = static_cast<std::uint16_t>(first.getType()),
+                            .flags = flags,
+                            .requestId = first.route().requestId,
+                            .clientType = first.getClientType(),
+                            .clientExtra = first.getClientExtra(),
+                            .timeNs = first.getTimeStampNs()},
+                           1, layout::kFirstSlotBodyBytes);
 }
 
 }  // namespace
@@ -158,8 +170,8 @@ void Binding::deliver(Message&& message) try {
   throw;
 }
 
-// Calls the handler with the value of `first` and, if it fills a slot, those like it that follow in
-// the ring. Not inline, so that deliver() stays small.
+// Calls the handler with the value of `first` and, if it fills a slot, with others of its run. Not
+// inline, so that deliver() stays small.
 [[gnu::noinline]] void Binding::deliverValues(const Message& first) {
   const auto body = first.body();
   if (body.size() != layout::kFirstSlotBodyBytes || values_.size != body.size()) {
@@ -168,21 +180,43 @@ void Binding::deliver(Message&& message) try {
     std::memcpy(value.data(), body.data(), values_.size);
     return values_.callback(std::span(value).first(values_.size), first);
   }
-  const Envelope like{.type = static_cast<std::uint16_t>(first.getType()),
-                      .bodyBytes = layout::kFirstSlotBodyBytes,
-                      .requestId = first.route().requestId,
-                      .clientType = first.getClientType(),
-                      .clientExtra = first.getClientExtra(),
-                      .timeNs = first.getTimeStampNs()};
   ValueRun run;
   run.add(FirstBody::of(body.data()));
-  const auto taken = channel().link().incoming().takeLike(
-      like, ValueRun::kMost - 1, [&](const FirstBody& next, std::uint32_t sentTick) {
-        run.add(next);
-        if (sentTick != 0) noteTimes(sentTick, nullptr);
-      });
+  takeFurtherReplies(first, run);
+  if (run.size() == 1 && (first.route().flags & kEndsRequest) != 0) takeFirstReplies(first, run);
+  values_.callback(run.bytes(), first);
+}
+
+// Takes the values after `first` that are further replies to the same request.
+void Binding::takeFurtherReplies(const Message& first, ValueRun& run) noexcept {
+  const auto like = wordsOf(first, 0);
+  takeValues(run, [&](const EnvelopeWords& words) {
+    if (words.body != like.body || words.request != like.request || !words.hasMarksOf(like))
+      return false;
+    if (words.sentTick() != 0) noteTimes(words.sentTick(), nullptr);
+    return true;
+  });
+}
+
+// Takes the values after `first` that are first replies to other requests, and ends these.
+void Binding::takeFirstReplies(const Message& first, ValueRun& run) noexcept {
+  const auto like = wordsOf(first, layout::kSlotFirstReply);
+  takeValues(run, [&](const EnvelopeWords& words) {
+    if (words.body != like.body || !words.hasMarksOf(like)) return false;
+    auto* const request = sender_.requests()->find(words.requestId());
+    if (request == nullptr || request->isGivenUp) return false;
+    if (words.sentTick() != 0 || request->sentNs != 0) noteTimes(words.sentTick(), request);
+    // Ended before the next message is looked at, which may name the same request.
+    endRequest(*request);
+    return true;
+  });
+}
+
+template <class Accept>
+void Binding::takeValues(ValueRun& run, const Accept& accept) noexcept {
+  const auto taken = channel().link().incoming().takeRun(
+      ValueRun::kMost - 1, accept, [&](const FirstBody& body) { run.add(body); });
   count(control().received, taken);
-  values_.callback(run.all(), first);
 }
 
 }  // namespace mpf

@@ -77,6 +77,13 @@ SentMany MessageClient::sendMany(std::span<Message> messages, Deadline takeBefor
   return binding_->sendMany(messages, takeBefore, requestIds);
 }
 
+SentMany MessageClient::sendBodies(MessageType type, std::size_t size,
+                                   std::span<const std::byte> bodies, Deadline takeBefore,
+                                   std::span<std::uint32_t> requestIds) noexcept {
+  if (isInherited()) return {0, SendResult::notConnected};
+  return binding_->sendBodies({type, size, bodies}, takeBefore, requestIds);
+}
+
 BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
 
 void MessageClient::cancel(std::uint32_t requestId) {

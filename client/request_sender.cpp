@@ -166,9 +166,9 @@ SendResult RequestSender::sendWithCopy(Message& message, std::int64_t deadlineNs
   return SendResult::sent;
 }
 
-SentMany RequestSender::sendMany(std::span<Message> messages, Deadline takeBefore,
-                                 std::span<std::uint32_t> requestIds) noexcept {
-  const auto deadlineNs = nsOf(takeBefore);
+template <class SendNext>
+SentMany RequestSender::sendInBatch(std::size_t count, std::int64_t deadlineNs,
+                                    const SendNext& sendNext) noexcept {
   SentMany sent;
   bool startsNudging = false;
   {
@@ -177,18 +177,84 @@ SentMany RequestSender::sendMany(std::span<Message> messages, Deadline takeBefor
     if (state_.load(std::memory_order_relaxed) != BindingState::connected)
       return {0, SendResult::notConnected};
     const Link::Batch batch(channel_->link());
-    for (; sent.count < messages.size(); ++sent.count) {
-      auto& message = messages[sent.count];
-      std::uint32_t id = 0;
-      sent.result = message ? trySendLocked(message, deadlineNs, id, nullptr) : SendResult::empty;
-      if (sent.result != SendResult::sent) break;
-      if (sent.count < requestIds.size()) requestIds[sent.count] = id;
+    while (sent.count < count && sent.result == SendResult::sent) {
+      const SentMany next = sendNext(sent.count);
+      sent = {sent.count + next.count, next.result};
     }
     if (sent.count != 0) startsNudging = !std::exchange(isNudging_, true);
   }
-  for (auto& message : messages.first(sent.count)) message.reset();
   if (sent.count != 0) setTimers(startsNudging, deadlineNs);
   return sent;
+}
+
+SentMany RequestSender::sendMany(std::span<Message> messages, Deadline takeBefore,
+                                 std::span<std::uint32_t> requestIds) noexcept {
+  const auto deadlineNs = nsOf(takeBefore);
+  const auto sent = sendInBatch(messages.size(), deadlineNs, [&](std::size_t index) -> SentMany {
+    auto& message = messages[index];
+    std::uint32_t id = 0;
+    const auto result =
+        message ? trySendLocked(message, deadlineNs, id, nullptr) : SendResult::empty;
+    if (result != SendResult::sent) return {0, result};
+    if (index < requestIds.size()) requestIds[index] = id;
+    return {1, result};
+  });
+  for (auto& message : messages.first(sent.count)) message.reset();
+  return sent;
+}
+
+SentMany RequestSender::sendBodies(const Bodies& bodies, Deadline takeBefore,
+                                   std::span<std::uint32_t> requestIds) noexcept {
+  const auto deadlineNs = nsOf(takeBefore);
+  return sendInBatch(bodies.count(), deadlineNs, [&](std::size_t index) {
+    const auto ids = requestIds.subspan(std::min(index, requestIds.size()));
+    return sendNextLocked(bodies.from(index), deadlineNs, ids);
+  });
+}
+
+// Sends as many as fit, or the first one as a message: if it is refused, the result says why.
+SentMany RequestSender::sendNextLocked(const Bodies& bodies, std::int64_t deadlineNs,
+                                       std::span<std::uint32_t> requestIds) noexcept {
+  if (const auto count = sendRunLocked(bodies, deadlineNs, requestIds); count != 0)
+    return {count, SendResult::sent};
+  auto message = Message::copyInline(bodies.type, bodies.first(1).all);
+  std::uint32_t id = 0;
+  const auto result = trySendLocked(message, deadlineNs, id, nullptr);
+  if (result != SendResult::sent) return {0, result};
+  if (!requestIds.empty()) requestIds.front() = id;
+  return {1, result};
+}
+
+// Returns 0 if there is no room now, and for bodies that do not fill a slot.
+std::size_t RequestSender::sendRunLocked(const Bodies& bodies, std::int64_t deadlineNs,
+                                         std::span<std::uint32_t> requestIds) noexcept {
+  auto& link = channel_->link();
+  if (!bodies.fillSlots() || bodies.size > link.maxMessageBytes()) return 0;
+  const auto most = std::min<std::size_t>(bodies.count(), requests_->room());
+  const auto words = [&](std::size_t index, std::int64_t sentNs) {
+    std::uint32_t id = 0;
+    auto& request = *requests_->tryReserve(id);
+    request.clientType = 0;
+    request.clientExtra = 0;
+    request.ordinal = link.outgoing().messages() + 1;
+    request.deadlineNs = deadlineNs;
+    request.sentNs = sentNs;
+    requests_->add(request, id);
+    MPF_STEP(request_added);
+    if (index < requestIds.size()) requestIds[index] = id;
+    return EnvelopeWords::of({.type = static_cast<std::uint16_t>(bodies.type),
+                              .requestId = id,
+                              .sentTick = Tick::ofSample(sentNs),
+                              .timeNs = deadlineNs},
+                             1, layout::kFirstSlotBodyBytes);
+  };
+  const auto noteSent = [&clientSent = link.control().clientSent](std::uint64_t messages) {
+    clientSent.store(messages, std::memory_order_relaxed);
+  };
+  const auto count =
+      link.trySendRun(words, bodies.first(most).all, {link.header().queueSize, 0}, noteSent);
+  if (count != 0) isFullReported_ = false;
+  return count;
 }
 
 // Without the lock, after messages were sent.

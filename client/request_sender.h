@@ -18,6 +18,7 @@
 #include "client/request_table.h"
 #include "client/untaken_requests.h"
 #include "shm/messages/message_link.h"
+#include "shm/messages/value_run.h"
 
 namespace mpf {
 
@@ -39,9 +40,11 @@ class RequestSender {
                   Retry retry) noexcept;
   // As RelayClient::sendAs().
   SendResult sendAs(std::uint32_t requestId, Message& message, Deadline takeBefore) noexcept;
-  // As MessageClient::sendMany().
+  // As MessageClient::sendMany(), of messages and of values.
   SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
                     std::span<std::uint32_t> requestIds) noexcept;
+  SentMany sendBodies(const Bodies& bodies, Deadline takeBefore,
+                      std::span<std::uint32_t> requestIds) noexcept;
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
   [[nodiscard]] const std::shared_ptr<BiasedLock>& lock() const noexcept { return lock_; }
@@ -84,6 +87,15 @@ class RequestSender {
                            std::unique_ptr<Message>* copy, Turn turn) noexcept;
   SendResult trySendLocked(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
                            std::unique_ptr<Message>* copy) noexcept;
+  // Calls `sendNext(index)` until `count` requests are sent, or one is not. It sends the request of
+  // this index, and as many of the next ones as it can.
+  template <class SendNext>
+  SentMany sendInBatch(std::size_t count, std::int64_t deadlineNs,
+                       const SendNext& sendNext) noexcept;
+  SentMany sendNextLocked(const Bodies& bodies, std::int64_t deadlineNs,
+                          std::span<std::uint32_t> requestIds) noexcept;
+  std::size_t sendRunLocked(const Bodies& bodies, std::int64_t deadlineNs,
+                            std::span<std::uint32_t> requestIds) noexcept;
   SendResult sendWithCopy(Message& message, std::int64_t deadlineNs,
                           std::uint32_t* requestId) noexcept;
   SendResult tryAllowMore() noexcept;

@@ -47,6 +47,9 @@ class RequestTable {
   // Lets more requests be outstanding, once. Returns false if there is no memory.
   [[nodiscard]] bool tryAllow(std::uint32_t maxOutstanding) noexcept;
 
+  // How many more may be outstanding. tryReserve() then finds a place for each, with a new id.
+  [[nodiscard]] std::uint32_t room() const noexcept { return max_ - outstanding(); }
+
   // Requests that ended or were given up so far.
   [[nodiscard]] std::uint64_t answered() const noexcept {
     return answered_.load(std::memory_order_relaxed);

@@ -6,6 +6,7 @@
 
 #include "base/stop_signals.h"
 #include "server/server_core.h"
+#include "shm/layout.h"
 
 namespace mpf {
 
@@ -66,29 +67,36 @@ std::size_t MessageServer::publish(const Message& message, std::span<const Messa
 int MessageServer::descriptor() { return core_->descriptor(); }
 
 void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> handler) {
-  handlers_[type] = std::move(handler);
+  core_->setRunHandler(type, {});
+  handlers_.at(static_cast<std::size_t>(type)) = std::move(handler);
 }
 
-void MessageServer::callHandler(const std::function<void(Message&&)>& handler,
-                                Message&& request) try {
-  handler(std::move(request));
-} catch (...) {  // the handler has destroyed the request, which has refused it
-  core_->endHandling();
-  core_->keepReadable();
-  throw;
+void MessageServer::setRunHandler(MessageType type, std::size_t size,
+                                  std::span<std::byte> (*fields)(Message&),
+                                  std::function<void(std::span<std::byte>)> handler) {
+  const auto handle = std::make_shared<HandleRun>(std::move(handler));
+  setHandler(type, [this, fields, handle](Message&& request) {
+    const auto value = fields(request);
+    if (value.empty()) return refuse(std::move(request));
+    (*handle)(value);
+    static_cast<void>(reply(std::move(request)));
+  });
+  if (size == layout::kFirstSlotBodyBytes) core_->setRunHandler(type, handle);
 }
 
 bool MessageServer::handleOne() {
-  auto request = receive();
-  if (!request) return false;
-  const auto handler = handlers_.find(request.getType());
-  if (handler == handlers_.end()) {
-    refuse(std::move(request));
-  } else {
-    callHandler(handler->second, std::move(request));
-  }
+  bool hasHandledRun = false;
+  if (auto request = core_->receiveOrHandleRun(hasHandledRun)) handle(std::move(request));
+  else if (!hasHandledRun) return false;
   core_->endHandling();
   return true;
+}
+
+void MessageServer::handle(Message&& request) {
+  const auto type = static_cast<std::size_t>(request.getType());
+  if (type >= handlers_.size() || !handlers_[type]) return refuse(std::move(request));
+  // If it throws, it has destroyed the request, which has refused it.
+  core_->callHandler([&] { handlers_[type](std::move(request)); });
 }
 
 void MessageServer::run() {

@@ -9,6 +9,21 @@
 #include "base/step.h"
 
 namespace mpf {
+namespace {
+
+// What is done after each message of a run.
+auto noteSent(Link& link) noexcept {
+  return [&serverSent = link.control().serverSent](std::uint64_t messages) {
+    MPF_STEP(reply_sent);
+    serverSent.store(messages, std::memory_order_relaxed);
+  };
+}
+
+// Of EnvelopeWords::body.
+const std::uint64_t kFirstReply =
+    EnvelopeWords::fullSlot(0, layout::kSlotFirstReply) ^ EnvelopeWords::fullSlot(0, 0);
+
+}  // namespace
 
 ReplyResult ReplySender::send(Message& message) noexcept {
   if (!message || message.route().link == 0 || forkGuard_.isInherited())
@@ -60,69 +75,115 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   return sent;
 }
 
-RepliedMany ReplySender::sendBodies(const Message& request, ReplyBodies bodies) noexcept {
+RepliedMany ReplySender::sendBodies(const Message& request, const Bodies& bodies) noexcept {
   constexpr std::size_t kMaxRun = 1024;  // other threads may wait for the lock
+  const auto count = bodies.count();
   RepliedMany sent;
-  while (!bodies.all.empty() && sent.result == ReplyResult::sent) {
-    const auto bytes = std::min(bodies.all.size(), kMaxRun * bodies.size);
-    const auto run = sendRun(request, {bodies.type, bodies.size, bodies.all.first(bytes)});
+  while (sent.count < count && sent.result == ReplyResult::sent) {
+    const auto rest = bodies.from(sent.count);
+    const auto run = sendRun(request, rest.first(std::min(rest.count(), kMaxRun)));
     sent = {sent.count + run.count, run.result};
-    bodies.all = bodies.all.subspan(bytes);
   }
   return sent;
 }
 
-RepliedMany ReplySender::sendRun(const Message& request, ReplyBodies bodies) noexcept {
+RepliedMany ReplySender::sendRun(const Message& request, const Bodies& bodies) noexcept {
   const auto& route = request.route();
   if (route.link == 0 || forkGuard_.isInherited()) return {0, ReplyResult::clientGone};
   auto& connection = Connection::of(route);
   const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   const Link::Batch batch(connection.channel->link());
+  const auto count = bodies.count();
   RepliedMany sent;
-  const bool fillsSlot = bodies.size == layout::kFirstSlotBodyBytes &&
-                         bodies.size <= connection.channel->link().maxMessageBytes();
+  const bool fillSlots =
+      bodies.fillSlots() && bodies.size <= connection.channel->link().maxMessageBytes();
   // The first reply, which ends the request, and bodies of other lengths go as messages. They are
   // copies: a body in a chunk would be sent in place, and the chunk belongs to the caller.
-  while (!bodies.all.empty() && (!fillsSlot || connection.owes(route.requestId))) {
-    auto message = Message::copyInline(bodies.type, bodies.all.first(bodies.size));
+  while (sent.count < count && (!fillSlots || connection.owes(route.requestId))) {
+    auto message = Message::copyInline(bodies.type, bodies.from(sent.count).first(1).all);
     message.setRoute({route.link, route.requestId, route.flags, nullptr});
     message.setClientType(request.getClientType());
     message.setClientExtra(request.getClientExtra());
     sent.result = sendLocked(connection, message);
     if (sent.result != ReplyResult::sent) break;
     ++sent.count;
-    bodies.all = bodies.all.subspan(bodies.size);
   }
   if (sent.result == ReplyResult::sent) sendFullSlotsLocked(connection, request, bodies, sent);
   if (sent.count != 0) counts_.sent(sent.count);
   return sent;
 }
 
-// Sends further replies to `request`, whose bodies fill a slot.
+// Sends those bodies that were not sent yet as further replies to `request`.
 void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& request,
-                                      ReplyBodies bodies, RepliedMany& sent) noexcept {
+                                      const Bodies& bodies, RepliedMany& sent) noexcept {
   auto& link = connection.channel->link();
-  Envelope envelope{
-      .type = static_cast<std::uint16_t>(bodies.type),
-      .requestId = request.route().requestId,
-      .clientType = request.getClientType(),
-      .clientExtra = request.getClientExtra(),
-      .timeNs = stamps_ ? Clock::wallNs() : 0,
+  const auto untimed = EnvelopeWords::of({.type = static_cast<std::uint16_t>(bodies.type),
+                                          .requestId = request.route().requestId,
+                                          .clientType = request.getClientType(),
+                                          .clientExtra = request.getClientExtra(),
+                                          .timeNs = stamps_ ? Clock::wallNs() : 0},
+                                         1, layout::kFirstSlotBodyBytes);
+  const auto words = [&](std::size_t, std::int64_t sentNs) {
+    auto timed = untimed;
+    if (sentNs != 0) timed.client = untimed.clientWith(Tick::ofSample(sentNs));
+    return timed;
   };
-  const auto noteSent = [&serverSent = link.control().serverSent](std::uint64_t messages) {
-    MPF_STEP(reply_sent);
-    serverSent.store(messages, std::memory_order_relaxed);
-  };
-  while (!bodies.all.empty()) {
-    const auto count = link.trySendRun(envelope, bodies.all, link.slotsOfFirstReplies(), noteSent);
-    if (count == 0) {
+  const Link::Limits limits{0, link.slotsOfFirstReplies()};
+  for (const auto count = bodies.count(); sent.count < count;) {
+    const auto run = link.trySendRun(words, bodies.from(sent.count).all, limits, noteSent(link));
+    if (run == 0) {
       sent.result = noteRefused(LinkSend::full);
       return;
     }
-    sent.count += count;
-    bodies.all = bodies.all.subspan(count * bodies.size);
+    sent.count += run;
   }
+}
+
+void ReplySender::sendRun(Connection& connection, std::uint32_t generation,
+                          RequestRun& run) noexcept {
+  std::size_t sent = 0;
+  {
+    const BiasedLock::Guard lock(*connection.lock);
+    // The handler may have received further requests, and closed the connection.
+    if (connection.generation != generation || !connection.channel) return;
+    sent = sendRunLocked(connection, run);
+  }
+  if (sent < run.size()) refuse(connection, generation, run, sent);
+}
+
+// Returns the number of replies; less than that of requests only if the client has sent more than
+// it may.
+std::size_t ReplySender::sendRunLocked(Connection& connection, RequestRun& run) noexcept {
+  auto& link = connection.channel->link();
+  const auto stamp = stamps_ ? static_cast<std::uint64_t>(Clock::wallNs()) : 0;
+  std::size_t sent = 0;
+  const auto words = [&](std::size_t index, std::int64_t sentNs) {
+    const auto& request = run[sent + index];
+    return EnvelopeWords{request.body | kFirstReply, request.request,
+                         request.clientWith(Tick::ofSample(sentNs)), stamp};
+  };
+  const Link::Batch batch(link);
+  while (sent < run.size()) {
+    const auto rest = run.values().subspan(sent * layout::kFirstSlotBodyBytes);
+    const auto count = link.trySendRun(words, rest, {}, noteSent(link));
+    if (count == 0) break;
+    sent += count;
+  }
+  for (std::size_t index = 0; index < sent; ++index) {
+    const auto requestId = run[index].requestId();
+    connection.owed(requestId).store(0, std::memory_order_relaxed);
+    if (requestId == connection.timedId) noteServiceTime(connection);
+  }
+  counts_.sent(sent);
+  return sent;
+}
+
+void ReplySender::refuse(Connection& connection, std::uint32_t generation, const RequestRun& run,
+                         std::size_t index) noexcept {
+  for (; index < run.size(); ++index)
+    refuseAbandoned({reinterpret_cast<std::uint64_t>(&connection), run[index].requestId(),
+                     generation, nullptr});
 }
 
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendOneLocked(Connection& connection,

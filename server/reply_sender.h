@@ -14,16 +14,10 @@
 
 #include "server/connection.h"
 #include "server/reply_counts.h"
+#include "server/request_run.h"
 #include "shm/fork_guard.h"
 
 namespace mpf {
-
-// Bodies of `size` bytes each, one after the other.
-struct ReplyBodies {
-  MessageType type;
-  std::size_t size;
-  std::span<const std::byte> all;
-};
 
 class ReplySender {
  public:
@@ -34,7 +28,13 @@ class ReplySender {
   ReplyResult send(Message& message) noexcept;
   // MessageServer::replyMany(), of messages and of values.
   RepliedMany sendMany(std::span<Message> messages) noexcept;
-  RepliedMany sendBodies(const Message& request, ReplyBodies bodies) noexcept;
+  RepliedMany sendBodies(const Message& request, const Bodies& bodies) noexcept;
+  // Sends the values of `run` as the replies to its requests. `generation`: of the connection when
+  // they were taken.
+  void sendRun(Connection& connection, std::uint32_t generation, RequestRun& run) noexcept;
+  // Ends those from `index` on with the fate `refused`.
+  void refuse(Connection& connection, std::uint32_t generation, const RequestRun& run,
+              std::size_t index) noexcept;
   // Ends a request of `connection` with a fate.
   void sendFate(Connection& connection, RequestMarks request, Fate fate) noexcept;
   // Ends a request whose handle was destroyed without a reply, with the fate `refused`.
@@ -47,8 +47,9 @@ class ReplySender {
   // Without data if the client has left, or its pool has no chunk.
   static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
-  RepliedMany sendRun(const Message& request, ReplyBodies bodies) noexcept;
-  void sendFullSlotsLocked(Connection& connection, const Message& request, ReplyBodies bodies,
+  RepliedMany sendRun(const Message& request, const Bodies& bodies) noexcept;
+  std::size_t sendRunLocked(Connection& connection, RequestRun& run) noexcept;
+  void sendFullSlotsLocked(Connection& connection, const Message& request, const Bodies& bodies,
                            RepliedMany& sent) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
   // The caller counts what was sent.

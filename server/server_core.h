@@ -13,7 +13,9 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include <mpf/message.h>
 #include <mpf/message_server.h>
@@ -25,6 +27,7 @@
 #include "server/reply_counts.h"
 #include "server/reply_sender.h"
 #include "server/request_keeper.h"
+#include "server/request_run.h"
 #include "shm/endpoint.h"
 
 namespace mpf {
@@ -45,6 +48,23 @@ class ServerCore {
 
   bool wait(Deadline deadline);
   Message receive();
+  // Null removes the handler.
+  void setRunHandler(MessageType type, std::shared_ptr<HandleRun> handler) {
+    runHandlers_.set(type, std::move(handler));
+  }
+  // As receive(). If there is a handler for several requests that wait, calls it, sends the
+  // replies, and returns an empty handle.
+  //   throws  what the handler throws, and as receive()
+  Message receiveOrHandleRun(bool& hasHandledRun);
+  // Calls a handler. The other requests wait if it throws.
+  template <class Handle>
+  void callHandler(const Handle& handle) try {
+    handle();
+  } catch (...) {
+    endHandling();
+    keepReadable();
+    throw;
+  }
   void interrupt() noexcept;
   // Whether the next wait() returns immediately.
   [[nodiscard]] bool isInterrupted() const noexcept {
@@ -72,7 +92,12 @@ class ServerCore {
   void handleControlEvents();
   void throwNext();
   Link* nextOther();
+  template <class TryHandle>
+  Message receiveUnless(const TryHandle& tryHandle);
   bool hasRequest(Connection& connection) noexcept;
+  bool tryHandleRun(Connection& connection);
+  bool tryHandleRun(Connection& connection, const HandleRun& handle);
+  bool tryNoteTaken(Connection& connection, const RequestRun& run) noexcept;
   bool tryBegin(Connection& connection, Envelope& envelope) noexcept;
   Message finishShort(Connection& connection, const Envelope& envelope) noexcept;
   struct Times {
@@ -97,6 +122,7 @@ class ServerCore {
   Publisher publisher_;
   RequestKeeper& keeper_;
   Progress progress_;
+  RunHandlers runHandlers_;
   std::int64_t takeBeforeNs_ = 0;  // of the request received last; 0: never
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;

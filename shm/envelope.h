@@ -92,11 +92,33 @@ struct EnvelopeWords {
     return {
         joined(joined(envelope.type, static_cast<std::uint8_t>(slots), envelope.flags), bodyBytes),
         joined(envelope.requestId, static_cast<std::uint32_t>(envelope.clientType)),
-        clientWord(envelope, envelope.sentTick), static_cast<std::uint64_t>(envelope.timeNs)};
+        joined(static_cast<std::uint32_t>(envelope.clientExtra), envelope.sentTick),
+        static_cast<std::uint64_t>(envelope.timeNs)};
   }
-  [[nodiscard, gnu::always_inline]] static std::uint64_t clientWord(const Envelope& envelope,
-                                                                    std::uint32_t tick) noexcept {
-    return detail::joined(static_cast<std::uint32_t>(envelope.clientExtra), tick);
+  // A copy of those in a slot. Each is read once: a peer may change them.
+  [[nodiscard, gnu::always_inline]] static EnvelopeWords in(const layout::Slot& first) noexcept {
+    const auto word = [&](std::size_t at) {
+      std::uint64_t value = 0;
+      std::memcpy(&value, reinterpret_cast<const std::byte*>(&first) + at, sizeof value);
+      return detail::alone(value);
+    };
+    return {word(offsetof(layout::Slot, type)), word(offsetof(layout::Slot, requestId)),
+            word(offsetof(layout::Slot, clientExtra)), word(offsetof(layout::Slot, deadlineNs))};
+  }
+  // The word `body` of a message whose body fills its one slot.
+  [[nodiscard]] static std::uint64_t fullSlot(std::uint16_t type, std::uint8_t flags) noexcept {
+    return of({.type = type, .flags = flags}, 1, layout::kFirstSlotBodyBytes).body;
+  }
+  [[nodiscard]] std::uint32_t requestId() const noexcept { return detail::firstOf(request); }
+  [[nodiscard]] std::uint32_t sentTick() const noexcept { return detail::secondOf(client); }
+  // The word `client` with another tick.
+  [[nodiscard]] std::uint64_t clientWith(std::uint32_t tick) const noexcept {
+    return detail::joined(detail::firstOf(client), tick);
+  }
+  // Whether the client has marked both messages alike, and they have the same time.
+  [[nodiscard]] bool hasMarksOf(const EnvelopeWords& other) const noexcept {
+    return detail::secondOf(request) == detail::secondOf(other.request) &&
+           clientWith(0) == other.clientWith(0) && timeNs == other.timeNs;
   }
   [[gnu::always_inline]] void copyTo(layout::Slot& first) const noexcept {
     auto* const slot = reinterpret_cast<std::byte*>(&first);

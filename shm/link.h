@@ -159,15 +159,19 @@ class Link {
                    Limits limits) noexcept {
     return trySend([&]() -> const Envelope& { return envelope; }, body, limits);
   }
-  // Sends messages with the same envelope, whose tick it sets. Each body fills a slot; they lie one
-  // after the other. Calls `sent(messages)` after each, with the number of all messages so far.
-  // Returns how many were sent, perhaps fewer than fit; 0: the ring is full.
-  template <class Sent>
-  std::size_t trySendRun(Envelope& envelope, std::span<const std::byte> bodies,
-                         std::uint32_t reserve, const Sent& sent) noexcept {
-    envelope.sentTick = Tick::ofSample(timeOfNext());
-    const auto most = bodies.size() / layout::kFirstSlotBodyBytes;
-    const auto count = out_.pushRun(envelope, bodies.data(), most, reserve, sent);
+  // Sends messages whose bodies fill a slot each and lie one after the other. For each, calls
+  // `words(index, sentNs)`, which returns its envelope, and then `sent(messages)` with the number
+  // of all messages so far; `sentNs` is as of timeOfNext(), and 0 for all but the first. Returns
+  // how many were sent, perhaps fewer than fit; 0: the ring is full, or as many wait as may.
+  template <class MakeWords, class Sent>
+  std::size_t trySendRun(const MakeWords& words, std::span<const std::byte> bodies, Limits limits,
+                         const Sent& sent) noexcept {
+    const auto wanted = bodies.size() / layout::kFirstSlotBodyBytes;
+    const auto most = limits.waiting == 0 ? wanted : roomFor(wanted, limits.waiting);
+    const auto firstNs = timeOfNext();
+    const auto count =
+        out_.pushRun([&](std::size_t index) { return words(index, index == 0 ? firstNs : 0); },
+                     bodies.data(), most, limits.reserve, sent);
     if (count != 0) afterPush();
     return count;
   }
@@ -269,6 +273,14 @@ class Link {
 
  private:
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
+  // How many of `wanted` messages may be sent if at most `limit` may wait.
+  [[nodiscard]] std::size_t roomFor(std::size_t wanted, std::uint32_t limit) noexcept {
+    const auto room = [limit](std::uint64_t waiting) {
+      return limit - std::min<std::uint64_t>(waiting, limit);
+    };
+    if (const auto known = room(out_.waitingAtMost()); known >= wanted) return wanted;
+    return std::min<std::size_t>(wanted, room(out_.waiting()));
+  }
   // For a body that does not fit into the first slot. The limits come one by one: a copy of both at
   // once would wait for their stores.
   LinkSend trySendLong(const Envelope& envelope, std::span<const std::byte> body,

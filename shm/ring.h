@@ -91,29 +91,25 @@ class RingProducer {
       detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     else if (!body.empty()) std::memcpy(first.body.data(), body.data(), body.size());
     publish(first, 1);
-    // A message with a reserve is one of a stream. Its receiver is behind, so this would only cost
-    // time.
-    if (isPolledElsewhere_ && reserve == 0) lines::offer(&first);
+    offer(first, reserve);
     return true;
   }
-  // Pushes messages with the same envelope, but that only the first has its tick. Each body fills a
-  // slot; they lie one after the other. Stops after `most` messages, before fewer than `reserve`
-  // slots would be free, or at the next claim of lines. Returns the number of messages; 0 if fewer
-  // than 1 + `reserve` slots are free. `pushed(messages)` is called after each.
-  template <class Pushed>
-  [[nodiscard]] std::size_t pushRun(const Envelope& envelope, const std::byte* bodies,
-                                    std::size_t most, std::uint32_t reserve,
-                                    const Pushed& pushed) noexcept {
-    if (!hasFree(1 + reserve)) return 0;
+  // Pushes messages whose bodies fill a slot each and lie one after the other. Stops after `most`
+  // messages, before fewer than `reserve` slots would be free, or at the next claim of lines.
+  // Returns the number of messages; 0 if fewer than 1 + `reserve` slots are free. For each, calls
+  // `words(index)`, which returns its envelope, and then `pushed(messages)`.
+  template <class MakeWords, class Pushed>
+  [[nodiscard, gnu::always_inline]] std::size_t pushRun(const MakeWords& words,
+                                                        const std::byte* bodies, std::size_t most,
+                                                        std::uint32_t reserve,
+                                                        const Pushed& pushed) noexcept {
+    if (most == 0 || !hasFree(1 + reserve)) return 0;
     if (pushed_ >= claimed_) claimLines();
     const auto count = std::min({most, freeEnd_ - reserve - pushed_, claimed_ - pushed_});
-    auto words = EnvelopeWords::of(envelope, 1, layout::kFirstSlotBodyBytes);
-    const auto untimed = EnvelopeWords::clientWord(envelope, 0);
     auto position = pushed_;
-    for (const auto end = pushed_ + count; position != end;) {
+    for (std::size_t index = 0; index != count; ++index) {
       auto& message = slot(position);
-      words.copyTo(message);
-      words.client = untimed;
+      words(index).copyTo(message);
       detail::copyWords<layout::kFirstSlotBodyBytes>(message.body.data(), bodies);
       bodies += layout::kFirstSlotBodyBytes;
       MPF_STEP(slot_written);
@@ -122,6 +118,7 @@ class RingProducer {
       MPF_STEP(slot_published);
       pushed(++messages_);
     }
+    if (count == 1) offer(slot(pushed_), reserve);
     pushed_ = position;
     next_.store(&slot(pushed_), std::memory_order_relaxed);
     return count;
@@ -218,6 +215,11 @@ class RingProducer {
     first.sequence.store(sequence, std::memory_order_release);
     MPF_STEP(slot_published);
     next_.store(&slot(pushed_), std::memory_order_relaxed);
+  }
+  // Sends the line of a single message towards the processor that polls for it. A message with a
+  // reserve is one of a stream. Its receiver is behind, so this would only cost time.
+  void offer(const layout::Slot& message, std::uint32_t reserve) const noexcept {
+    if (isPolledElsewhere_ && reserve == 0) lines::offer(&message);
   }
   void copyBody(layout::Slot& first, std::span<const std::byte> body) const noexcept {
     const auto head = std::min(body.size(), first.body.size());

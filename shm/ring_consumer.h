@@ -55,6 +55,10 @@ class RingConsumer {
                                   tryMove() && sequence() == taken_ + 1);
   }
 
+  // The type of the next message, after hasMessage().
+  [[nodiscard]] std::uint16_t nextType() const noexcept { return detail::alone(first_->type); }
+  // Whether another message follows the next one, if that has one slot.
+  [[nodiscard]] bool hasSecond() const noexcept { return isFilled(taken_ + 1); }
   // Counts the next message as taken and copies its envelope. Call it only after hasMessage()
   // returned true. From now on the sender sees that we may have acted on the message.
   [[nodiscard]] Envelope begin() noexcept {
@@ -110,22 +114,25 @@ class RingConsumer {
   }
   // The same if hasOneSlot().
   void endOneSlot() noexcept { end(1); }
-  // Takes the messages after the one that was ended last, while they have one slot and differ from
-  // `like` only in body and tick; at most `most`, and not beyond the end of the batch. Counts all
-  // of them as taken before it reads a body. Calls `take(body, sentTick)` for each; returns their
-  // number.
-  template <class Take>
-  std::uint64_t takeLike(const Envelope& like, std::uint64_t most, const Take& take) noexcept {
-    const auto count = countLike(like, std::min(most, batchEnd_ - taken_));
+  // Takes the next messages together, as long as each has the next sequence and accept(words) is
+  // true for its envelope; at most `most`, and not beyond the end of the batch. accept() lets only
+  // messages of one slot pass. Counts all of them as taken before it reads a body. Calls
+  // `take(body)` for each; returns their number.
+  template <class Accept, class Take>
+  [[gnu::always_inline]] std::uint64_t takeRun(std::uint64_t most, const Accept& accept,
+                                               const Take& take) noexcept {
+    most = std::min(most, batchEnd_ - taken_);
+    std::uint64_t count = 0;
+    while (count < most && isFilled(taken_ + count) &&
+           accept(EnvelopeWords::in(slot(taken_ + count))))
+      ++count;
     if (count == 0) return 0;
     messages_ += count;
     // PAIR(message-taken): stored before we look at the bodies.
     own_.taken.store(messages_, std::memory_order_release);
     MPF_STEP(message_counted);
-    for (auto position = taken_; position < taken_ + count; ++position) {
-      const auto& each = slot(position);
-      take(FirstBody::of(each.body.data()), each.sentTick);
-    }
+    for (auto position = taken_; position < taken_ + count; ++position)
+      take(FirstBody::of(slot(position).body.data()));
     end(count);
     return count;
   }
@@ -170,24 +177,10 @@ class RingConsumer {
     return true;
   }
 
-  [[nodiscard]] std::uint64_t countLike(const Envelope& envelope,
-                                        std::uint64_t most) const noexcept {
-    const auto like = EnvelopeWords::of(envelope, 1, envelope.bodyBytes);
-    std::uint64_t count = 0;
-    while (count < most && isLike(like, envelope.clientExtra, taken_ + count)) ++count;
-    return count;
-  }
-  [[nodiscard]] bool isLike(const EnvelopeWords& like, std::int32_t clientExtra,
-                            std::uint64_t position) const noexcept {
-    const auto& other = slot(position);
-    const auto has = [&](std::size_t at, std::uint64_t word) {
-      return std::memcmp(reinterpret_cast<const std::byte*>(&other) + at, &word, sizeof word) == 0;
-    };
+  // Whether the message of this position, which has one slot, is complete.
+  [[nodiscard]] bool isFilled(std::uint64_t position) const noexcept {
     // PAIR(slot-filled): the message is complete.
-    return other.sequence.load(std::memory_order_acquire) == position + 1 &&
-           has(offsetof(layout::Slot, type), like.body) &&
-           has(offsetof(layout::Slot, requestId), like.request) &&
-           other.clientExtra == clientExtra && has(offsetof(layout::Slot, deadlineNs), like.timeNs);
+    return slot(position).sequence.load(std::memory_order_acquire) == position + 1;
   }
 
   void end(std::uint64_t slots) noexcept {

@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <span>
@@ -30,6 +31,7 @@ class MpfPeer final : public Peer {
   void serve(const RunContext& context) override {
     MessageServer server(Backplane::attach(places_.serverBackplane), kServer, optionsOfServer());
     context.ready();
+    if (places_.inRuns) return serveInRuns(server, context);
     for (bool last = false; !last && server.waitForMessage();) {
       while (auto request = server.receive()) {
         last = context.stopping();
@@ -56,6 +58,10 @@ class MpfPeer final : public Peer {
       throw std::runtime_error("not connected: " + client_->notConnectedBecause());
   }
   void send() override {
+    if (places_.inRuns) {
+      ++unsent_;
+      return;
+    }
     SendResult result{};
     if (options_.bytes == 4) {
       result = client_->send(Int32Message({.address = 3, .value = 100}));
@@ -70,7 +76,10 @@ class MpfPeer final : public Peer {
   }
   void receive() override {
     ++awaited_;
-    while (received_ < awaited_) dispatcher_->runOnce();
+    while (received_ < awaited_) {
+      if (unsent_ != 0) sendRun();
+      dispatcher_->runOnce();
+    }
   }
   void roundTrip() override {
     send();
@@ -83,6 +92,7 @@ class MpfPeer final : public Peer {
     context.ready();
     connect(context);
     send();
+    sendRun();
     for (std::uint64_t runs = 0;; ++runs) {
       dispatcher_->runOnce();
       if (runs % 4 == 0) context.consumed(received_);  // runs of up to 16 messages
@@ -111,6 +121,22 @@ class MpfPeer final : public Peer {
  private:
   static constexpr std::size_t kBatch = 64;
 
+  static void serveInRuns(MessageServer& server, const RunContext& context) {
+    server.on<Int32>([](std::span<Int32>) {});
+    for (bool last = false; !last && server.waitForMessage();) {
+      while (server.handleOne()) last = context.stopping();
+    }
+  }
+  // Sends what send() has counted.
+  void sendRun() {
+    while (unsent_ != 0) {
+      const auto count = std::min(unsent_, batch_.size());
+      const auto sent = client_->template sendMany<Int32>(std::span(batch_).first(count));
+      if (sent.result != SendResult::sent)
+        throw std::runtime_error(std::string("sendMany: ") + toString(sent.result));
+      unsent_ -= sent.count;
+    }
+  }
   void sendOneByOne(MessageServer& server, const Message& request) {
     for (std::size_t i = 0; i < kBatch; ++i) {
       auto reply = server.allocReplyMessage<Int32>(request);
@@ -158,7 +184,8 @@ class MpfPeer final : public Peer {
   std::uint64_t received_ = 0;
   std::uint64_t awaited_ = 0;
   std::int32_t value_ = 0;
-  std::array<Int32, kBatch> batch_;
+  std::array<Int32, kBatch> batch_{};
+  std::size_t unsent_ = 0;  // with inRuns
 };
 
 }  // namespace
@@ -226,14 +253,24 @@ PeerFamily mpfPeer() {
 }
 
 PeerFamily mpfBatchPeer(bool inRuns) {
-  PeerFamily family;
+  auto family = mpfPeer();
   family.name = std::string(kMpf) + (inRuns ? ", 64 at a time, taken in runs" : ", 64 at a time");
-  family.modes = {Mode::spin, Mode::adaptive, Mode::block};
   family.make = [inRuns](const PeerOptions& options) {
     return makeMpfPeer<Char8Array>(options, {.serverBackplane = options.name,
                                              .clientBackplane = options.name,
                                              .inBatches = true,
                                              .inRuns = inRuns});
+  };
+  return family;
+}
+
+PeerFamily mpfRunPeer() {
+  auto family = mpfPeer();
+  family.name = std::string(kMpf) + ", in runs";
+  family.make = [](const PeerOptions& options) {
+    return makeMpfPeer<Char8Array>(
+        options,
+        {.serverBackplane = options.name, .clientBackplane = options.name, .inRuns = true});
   };
   return family;
 }

@@ -23,7 +23,9 @@ struct MpfPlaces {
   std::int32_t location = 0;
   int queueSize = 1024;  // sets the length of the rings, too; short ones make a stream slower
   bool inBatches = false;  // the server sends values with replyMany()
-  bool inRuns = false;  // the client receives them with onValues()
+  // The client sends values with sendMany() and receives them with onValues(); the server handles
+  // several requests together.
+  bool inRuns = false;
 };
 
 // The MPF peer. 4 bytes are an Int32 message; more bytes are an array of type Array, which the

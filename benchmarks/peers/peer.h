@@ -95,6 +95,8 @@ struct PeerFamily {
 [[nodiscard]] PeerFamily mpfPeer();
 // replyMany() of values, and with `inRuns` onValues(); one-way traffic only
 [[nodiscard]] PeerFamily mpfBatchPeer(bool inRuns);
+// values in runs: sendMany(), a handler of several requests, onValues(); outstanding requests only
+[[nodiscard]] PeerFamily mpfRunPeer();
 [[nodiscard]] PeerFamily boostPeer();
 [[nodiscard]] PeerFamily socketPeer();
 [[nodiscard]] PeerFamily zeromqPeer();

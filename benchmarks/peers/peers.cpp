@@ -162,8 +162,10 @@ std::vector<Measurement> peerMeasurements(const std::string& runName) {
       add(family, std::move(row), oneWay, {"one-way"});
     }
   }
+  auto outstandingFamilies = all;
+  outstandingFamilies.insert(outstandingFamilies.begin() + 1, mpfRunPeer());
   for (const int window : {1, 10, 100}) {
-    for (const auto& family : all) {
+    for (const auto& family : outstandingFamilies) {
       for (const auto mode : modesOf(family)) {
         auto row = asker.row(
             family, "Requests and replies of 4 B with " + std::to_string(window) + " outstanding",

@@ -26,12 +26,15 @@
 //          continues with the remaining requests. Clients follow the same rule: see Dispatcher.
 #pragma once
 
+#include <array>
+#include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -207,27 +210,45 @@ class MessageServer {
     return result;
   }
 
-  // Sets the handler that run() and handleOne() call for each request of type T. A handler with the
-  // parameter T& (the fields) or MessageOf<T>& (the fields and the elements) changes the request,
-  // which is then sent as the reply. A handler with the parameter MessageOf<T>&& owns the request
-  // and replies to it itself, now or later.
+  // Sets the handler that run() and handleOne() call for requests of type T. What it gets depends
+  // on its parameter:
+  //
+  //   T&               the fields of one request, which is then sent as the reply
+  //   MessageOf<T>&    one request, with its elements and marks, which is then sent as the reply
+  //   MessageOf<T>&&   the same; the handler owns the request and replies to it, now or later
+  //   std::span<T>     the fields of 1 to 16 waiting requests of one client, which are then sent as
+  //                    the replies, in order. Only for scalars. Faster for a client that sends many
+  //                    requests; no reply is sent before all of them are handled. A request comes
+  //                    alone if it has a deadline, or T is neither Int32 nor OutOfBand
   template <MessageBody T, class Handler>
   void on(Handler handler) {
     setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
-      auto typed = MessageOf<T>::tryFrom(std::move(message));
-      if (!typed)
-        // NOLINTNEXTLINE(bugprone-use-after-move): tryFrom() has left it unchanged
-        return refuse(std::move(message));
       if constexpr (std::is_invocable_v<Handler&, T&>) {
-        handler(**typed);
-        static_cast<void>(reply(std::move(*typed)));
-      } else if constexpr (std::is_invocable_v<Handler&, MessageOf<T>&>) {
-        handler(*typed);
-        static_cast<void>(reply(std::move(*typed)));
+        auto* const fields = message.tryAs<T>();
+        if (fields == nullptr) return refuse(std::move(message));
+        handler(*fields);
+        static_cast<void>(reply(std::move(message)));
       } else {
-        handler(std::move(*typed));
+        auto typed = MessageOf<T>::tryFrom(std::move(message));
+        if (!typed)
+          // NOLINTNEXTLINE(bugprone-use-after-move): tryFrom() has left it unchanged
+          return refuse(std::move(message));
+        if constexpr (std::is_invocable_v<Handler&, MessageOf<T>&>) {
+          handler(*typed);
+          static_cast<void>(reply(std::move(*typed)));
+        } else {
+          handler(std::move(*typed));
+        }
       }
     });
+  }
+  template <ScalarBody T, std::invocable<std::span<T>> Handler>
+  void on(Handler handler) {
+    setRunHandler(
+        T::kType, sizeof(T), &fieldsOf<T>,
+        [handler = std::move(handler)](std::span<std::byte> values) mutable {
+          handler(std::span(reinterpret_cast<T*>(values.data()), values.size() / sizeof(T)));
+        });
   }
   // Handles requests until interrupt(), which takes effect between two requests. Refuses requests
   // of a type that has no handler.
@@ -262,7 +283,17 @@ class MessageServer {
  private:
   friend class RelayServer;  // internal, for routers
   void setHandler(MessageType type, std::function<void(Message&&)> handler);
-  void callHandler(const std::function<void(Message&&)>& handler, Message&& request);
+  // A handler of values of `size` bytes each, which lie one after the other.
+  //   fields  returns the value of a request, without a body if the request is invalid
+  void setRunHandler(MessageType type, std::size_t size, std::span<std::byte> (*fields)(Message&),
+                     std::function<void(std::span<std::byte>)> handler);
+  template <ScalarBody T>
+  static std::span<std::byte> fieldsOf(Message& request) {
+    auto* const value = request.tryAs<T>();
+    if (value == nullptr) return {};
+    return std::as_writable_bytes(std::span(value, 1));
+  }
+  void handle(Message&& request);
   // Bodies of `size` bytes each, one after the other.
   RepliedMany replyBodies(const Message& request, MessageType type, std::size_t size,
                           std::span<const std::byte> bodies) noexcept;
@@ -275,7 +306,8 @@ class MessageServer {
     reply.setClientExtra(request.getClientExtra());
   }
   std::unique_ptr<class ServerCore> core_;
-  std::map<MessageType, std::function<void(Message&&)>> handlers_;
+  // By the number of a type.
+  std::array<std::function<void(Message&&)>, std::tuple_size_v<MessageTypes> + 1> handlers_;
 };
 
 }  // namespace mpf

@@ -56,19 +56,6 @@ TEST_F(ValueRuns, EndAtTheReplyToAnotherRequest) {
   EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(1, 2), ElementsAre(3)));
 }
 
-TEST_F(ValueRuns, DoNotContainTheFirstReplyToAnotherRequest) {
-  startServer();
-  std::vector<Message> requests;
-  requests.push_back(heldRequest());
-  for (int i = 0; i < 2; ++i) requests.push_back(another(0));
-
-  for (const auto& request : requests) reply(request, 5);
-  receive(3);
-
-  EXPECT_EQ(runs_.size(), 3u);
-  for (const auto& run : runs_) EXPECT_TRUE(run.endsRequest);
-}
-
 TEST_F(ValueRuns, EndAtAMessageOfAnotherTypeWhichGoesToTheCallback) {
   startServer();
   const auto request = heldRequest();

@@ -3,7 +3,7 @@
 // killed before any step.
 //
 //   MODELS  shm/ring.h: RingProducer tryPush pushRun hasFree waiting isTaken
-//   MODELS  shm/ring_consumer.h: RingConsumer hasMessage begin copyBody end takeLike
+//   MODELS  shm/ring_consumer.h: RingConsumer hasMessage begin copyBody end takeRun
 //   HOLDS   each message arrives once, whole and in order, while both processes run; no message
 //           waits forever for slots
 //   HOLDS   after the death of a producer, exactly the messages with a completed release store

@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: MIT
-// ServerCore: which requests it returns, and which it ends itself.
+// ServerCore: which requests it returns, handles together, or ends itself.
 #include "server/server_core.h"
 
-#include <chrono>
-#include <gtest/gtest.h>
+#include <poll.h>
 
+#include <chrono>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "shm/handling.h"
 #include "tests/shm/endpoint_pair.h"
 #include "tests/shm/shm_fixture.h"
 
@@ -26,9 +34,10 @@ class ServerCoreTest : public ShmTest {
     return &client_->keep(index, Link::create(name(), endpoint.window(), index, std::move(server)));
   }
   void sendRequest(std::uint32_t requestId, std::int64_t deadlineNs = 0,
-                   std::size_t bytes = sizeof(Int32)) {
+                   std::size_t bytes = sizeof(Int32), std::uint32_t sentTick = 0) {
     Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::int32),
                       .requestId = requestId,
+                      .sentTick = sentTick,
                       .timeNs = deadlineNs};
     ASSERT_EQ(link_->trySend(envelope, std::vector<std::byte>(bytes), {}), LinkSend::sent);
   }
@@ -148,6 +157,141 @@ TEST_F(ServerCoreTest, AQueueSizeOutsideTheLimitsIsAnError) {
   server_->setQueueSize(16384);
 
   EXPECT_EQ(server_->counts().queueSize, 16384u);
+}
+
+class RequestRunTest : public ServerCoreTest {
+ protected:
+  RequestRunTest() {
+    server_->setRunHandler(
+        MessageType::int32, std::make_shared<HandleRun>([this](std::span<std::byte> values) {
+          sizes_.push_back(values.size() / sizeof(Int32));
+          const auto handling = Handling::of(control().handling.load());
+          EXPECT_TRUE(handling && handling->type == static_cast<std::uint16_t>(MessageType::int32));
+        }));
+  }
+  [[nodiscard]] const layout::WindowControl& control() const { return link_->peer()->control(); }
+  // Handles the next requests; false if they were received as a message, or none waits.
+  bool handleRun() {
+    bool hasHandledRun = false;
+    EXPECT_FALSE(server_->receiveOrHandleRun(hasHandledRun));
+    server_->endHandling();
+    return hasHandledRun;
+  }
+  [[nodiscard]] static std::uint64_t total(const layout::Histogram& histogram) {
+    std::uint64_t sum = 0;
+    for (const auto& bucket : histogram.buckets) sum += bucket.load(std::memory_order_relaxed);
+    return sum;
+  }
+  // The ids of the replies that wait, which are first replies.
+  std::vector<std::uint32_t> repliedIds() {
+    std::vector<std::uint32_t> ids;
+    for (auto& ring = link_->incoming(); ring.hasMessage(); ring.end()) {
+      const auto envelope = ring.begin();
+      EXPECT_EQ(envelope.flags, layout::kSlotFirstReply);
+      EXPECT_EQ(envelope.type, static_cast<std::uint16_t>(MessageType::int32));
+      ids.push_back(envelope.requestId);
+    }
+    return ids;
+  }
+
+  std::vector<std::size_t> sizes_;
+};
+
+TEST_F(RequestRunTest, IsAnsweredUnderTheIdOfEachRequest) {
+  for (const std::uint32_t id : {7u, 3u, 5u}) sendRequest(id);
+
+  EXPECT_TRUE(handleRun());
+
+  EXPECT_THAT(sizes_, testing::ElementsAre(3));
+  EXPECT_THAT(repliedIds(), testing::ElementsAre(7, 3, 5));
+  EXPECT_EQ(server_->counts().requests, 3u);
+  EXPECT_EQ(server_->counts().replies, 3u);
+  EXPECT_EQ(control().handling.load(), 0u);
+}
+
+TEST_F(RequestRunTest, NeedsTwoRequests) {
+  sendRequest(1);
+
+  bool hasHandledRun = false;
+  const auto request = server_->receiveOrHandleRun(hasHandledRun);
+
+  EXPECT_TRUE(request);
+  EXPECT_FALSE(hasHandledRun);
+  EXPECT_THAT(sizes_, testing::IsEmpty());
+}
+
+TEST_F(RequestRunTest, EndsTheConnectionIfAnIdIsInUse) {
+  sendRequest(1);
+  const auto request = server_->receive();
+  sendRequest(2);
+  sendRequest(1);
+
+  EXPECT_TRUE(handleRun());
+
+  EXPECT_FALSE(isConnected());
+  EXPECT_EQ(control().protocolErrors.load(), 1u);
+  EXPECT_THAT(sizes_, testing::IsEmpty());
+}
+
+TEST_F(RequestRunTest, EndsTheConnectionIfTwoRequestsHaveTheSameId) {
+  sendRequest(1);
+  sendRequest(1);
+
+  EXPECT_TRUE(handleRun());
+
+  EXPECT_FALSE(isConnected());
+  EXPECT_THAT(sizes_, testing::IsEmpty());
+}
+
+TEST_F(RequestRunTest, LetsTheIdsBeUsedAgain) {
+  for (int round = 0; round < 3; ++round) {
+    sendRequest(1);
+    sendRequest(2);
+    EXPECT_TRUE(handleRun());
+  }
+
+  EXPECT_TRUE(isConnected());
+  EXPECT_THAT(repliedIds(), testing::ElementsAre(1, 2, 1, 2, 1, 2));
+}
+
+TEST_F(RequestRunTest, TimesTheRequestsThatSayWhenTheyWereSent) {
+  sendRequest(1);
+  sendRequest(2, 0, sizeof(Int32), Tick::of(Clock::nowNs()));
+
+  EXPECT_TRUE(handleRun());
+
+  EXPECT_EQ(total(control().queueWaitNs), 1u);
+  EXPECT_EQ(total(control().serviceNs), 1u);
+}
+
+TEST_F(RequestRunTest, DoesNotContainABodyOfAnotherSize) {
+  sendRequest(1);
+  sendRequest(2, 0, sizeof(Int32) - 1);
+  sendRequest(3);
+
+  bool hasHandledRun = false;
+  EXPECT_FALSE(server_->receiveOrHandleRun(hasHandledRun));
+  EXPECT_TRUE(hasHandledRun);
+  EXPECT_THAT(sizes_, testing::ElementsAre(1));
+  const auto invalid = server_->receiveOrHandleRun(hasHandledRun);
+  EXPECT_FALSE(invalid.isSound());
+}
+
+TEST_F(RequestRunTest, KeepsTheRequestsAfterAHandlerThatThrows) {
+  server_->setRunHandler(MessageType::int32, std::make_shared<HandleRun>([](auto) {
+                           throw std::runtime_error("the handler throws");
+                         }));
+  pollfd descriptor{server_->descriptor(), POLLIN, 0};
+  ASSERT_FALSE(server_->receive());
+  sendRequest(1);
+  sendRequest(2);
+  bool hasHandledRun = false;
+
+  EXPECT_THROW(server_->receiveOrHandleRun(hasHandledRun), std::runtime_error);
+
+  EXPECT_EQ(::poll(&descriptor, 1, 0), 1);
+  EXPECT_EQ(control().handling.load(), 0u);
+  EXPECT_EQ(control().refused.load(), 2u);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ using testing::ElementsAre;
 class RingRunTest : public testing::Test {
  protected:
   static constexpr std::uint32_t kCapacity = 128;  // batches of 16
-  static constexpr std::uint64_t kMost = 15;
+  static constexpr std::uint64_t kMost = 16;
   static constexpr Envelope kEnvelope{.type = 3,
                                       .bodyBytes = layout::kFirstSlotBodyBytes,
                                       .requestId = 4,
@@ -40,24 +40,30 @@ class RingRunTest : public testing::Test {
     std::size_t pushed = 0;
     for (;;) {
       const auto* const next = all.data() + pushed * layout::kFirstSlotBodyBytes;
-      const auto more = producer_.pushRun(kEnvelope, next, count - pushed, reserve,
-                                          [&](auto messages) { counted_ = messages; });
+      const auto more =
+          producer_.pushRun([&](std::size_t) { return wordsOf(kEnvelope); }, next, count - pushed,
+                            reserve, [&](auto messages) { counted_ = messages; });
       EXPECT_EQ(counted_, producer_.messages());
       pushed += more;
       if (more == 0 || pushed == count) return pushed;
     }
   }
-  // Takes the next message; returns the numbers of those that are taken with it, and keeps their
-  // ticks.
-  std::vector<std::uint64_t> takeLike(std::uint64_t most = kMost) {
-    static_cast<void>(consumer_.begin());
-    consumer_.end();
-    std::vector<std::uint64_t> numbers;
-    ticks_.clear();
-    consumer_.takeLike(kEnvelope, most, [&](const FirstBody& body, std::uint32_t tick) {
-      numbers.push_back(body.first);
-      ticks_.push_back(tick);
+  static EnvelopeWords wordsOf(const Envelope& envelope) {
+    return EnvelopeWords::of(envelope, 1, envelope.bodyBytes);
+  }
+  // Takes messages with kEnvelope, whatever their ticks, and returns their numbers.
+  std::vector<std::uint64_t> takeRun(std::uint64_t most = kMost) {
+    return takeRun(most, [](const EnvelopeWords& words) {
+      const auto like = wordsOf(kEnvelope);
+      return words.body == like.body && words.request == like.request && words.hasMarksOf(like);
     });
+  }
+  template <class Accept>
+  std::vector<std::uint64_t> takeRun(std::uint64_t most, const Accept& accept) {
+    std::vector<std::uint64_t> numbers;
+    const auto count = consumer_.takeRun(
+        most, accept, [&](const FirstBody& body) { numbers.push_back(body.first); });
+    EXPECT_EQ(count, numbers.size());
     return numbers;
   }
 
@@ -65,14 +71,13 @@ class RingRunTest : public testing::Test {
   layout::RingControl control_{};
   RingProducer producer_{slots_.get(), kCapacity, control_};
   RingConsumer consumer_{slots_.get(), kCapacity, control_};
-  std::vector<std::uint32_t> ticks_;
   std::uint64_t counted_ = 0;  // by the callback of pushRun()
 };
 
 TEST_F(RingRunTest, TakesWhatIsThereAndCountsIt) {
   for (const auto number : {10u, 11u, 12u}) push(number);
 
-  EXPECT_THAT(takeLike(), ElementsAre(11, 12));
+  EXPECT_THAT(takeRun(), ElementsAre(10, 11, 12));
 
   EXPECT_EQ(consumer_.messages(), 3u);
   EXPECT_EQ(control_.taken.load(std::memory_order_relaxed), 3u);
@@ -81,28 +86,60 @@ TEST_F(RingRunTest, TakesWhatIsThereAndCountsIt) {
   EXPECT_TRUE(consumer_.hasMessage());
 }
 
-TEST_F(RingRunTest, TakesNothingIfNothingFollows) {
-  push(10);
+TEST_F(RingRunTest, TakesNothingFromAnEmptyRing) {
+  EXPECT_THAT(takeRun(), ElementsAre());
 
-  EXPECT_THAT(takeLike(), ElementsAre());
-
-  EXPECT_EQ(control_.taken.load(std::memory_order_relaxed), 1u);
+  EXPECT_EQ(control_.taken.load(std::memory_order_relaxed), 0u);
 }
 
 TEST_F(RingRunTest, TakesNoMoreThanItIsAllowedTo) {
   for (const auto number : {10u, 11u, 12u, 13u}) push(number);
 
-  EXPECT_THAT(takeLike(2), ElementsAre(11, 12));
-  EXPECT_THAT(takeLike(0), ElementsAre());
+  EXPECT_THAT(takeRun(2), ElementsAre(10, 11));
+  EXPECT_THAT(takeRun(0), ElementsAre());
 }
 
 TEST_F(RingRunTest, StopsAtTheEndOfABatchAndFreesIt) {
   for (std::uint64_t number = 0; number < 20; ++number) push(number);
-  static_cast<void>(takeLike(0));
+  EXPECT_EQ(takeRun(1).size(), 1u);
 
-  EXPECT_EQ(takeLike(100).size(), 14u);
+  EXPECT_EQ(takeRun(100).size(), 15u);
 
   EXPECT_EQ(control_.freed.load(std::memory_order_relaxed), 16u);
+}
+
+TEST_F(RingRunTest, ShowsTheEnvelopeOfEachMessageBeforeItIsTaken) {
+  auto other = kEnvelope;
+  other.requestId = 99;
+  other.sentTick = 98;
+  push(10);
+  push(11, other);
+  push(12);
+  std::vector<EnvelopeWords> seen;
+
+  const auto numbers = takeRun(kMost, [&](const EnvelopeWords& words) {
+    EXPECT_EQ(control_.taken.load(std::memory_order_relaxed), 0u);
+    seen.push_back(words);
+    return seen.size() < 3;
+  });
+
+  EXPECT_THAT(numbers, ElementsAre(10, 11));
+  ASSERT_EQ(seen.size(), 3u);
+  EXPECT_EQ(seen[0].requestId(), kEnvelope.requestId);
+  EXPECT_EQ(seen[0].sentTick(), 0u);
+  EXPECT_EQ(seen[1].requestId(), 99u);
+  EXPECT_EQ(seen[1].sentTick(), 98u);
+  EXPECT_TRUE(seen[1].hasMarksOf(seen[0]));
+}
+
+TEST_F(RingRunTest, SeesWhetherASecondMessageFollows) {
+  push(10);
+  EXPECT_FALSE(consumer_.hasSecond());
+
+  push(11);
+
+  EXPECT_TRUE(consumer_.hasSecond());
+  EXPECT_EQ(consumer_.nextType(), kEnvelope.type);
 }
 
 TEST_F(RingRunTest, TheTickMayDiffer) {
@@ -112,9 +149,7 @@ TEST_F(RingRunTest, TheTickMayDiffer) {
   push(11, timed);
   push(12);
 
-  EXPECT_THAT(takeLike(), ElementsAre(11, 12));
-
-  EXPECT_THAT(ticks_, ElementsAre(99, 0));
+  EXPECT_THAT(takeRun(), ElementsAre(10, 11, 12));
 }
 
 TEST_F(RingRunTest, StopsAtAnyOtherEnvelope) {
@@ -136,7 +171,7 @@ TEST_F(RingRunTest, StopsAtAnyOtherEnvelope) {
     push(11);
     push(12, other);
 
-    EXPECT_THAT(takeLike(), ElementsAre(11));
+    EXPECT_THAT(takeRun(), ElementsAre(10, 11));
 
     ASSERT_TRUE(consumer_.hasMessage());
     EXPECT_EQ(consumer_.begin().bodyBytes, other.bodyBytes);
@@ -152,11 +187,11 @@ TEST_F(RingRunTest, StopsAtAMessageOfSeveralSlotsAccordingToItsEnvelope) {
     push(11);
     slots_[at % kCapacity].slots = slots;
 
-    EXPECT_THAT(takeLike(), ElementsAre()) << int{slots};
+    EXPECT_THAT(takeRun(), ElementsAre(10)) << int{slots};
 
     ASSERT_TRUE(consumer_.hasMessage());
     slots_[at % kCapacity].slots = 1;
-    static_cast<void>(takeLike());
+    EXPECT_THAT(takeRun(), ElementsAre(11));
   }
 }
 
@@ -175,15 +210,14 @@ TEST_F(RingRunTest, CrossesIntoASecondRing) {
   std::vector<std::uint64_t> taken;
   while (taken.size() < kMessages) {
     for (std::uint64_t more = 1; more != 0 && pushed < kMessages; pushed += more) {
-      more = producer.pushRun(kEnvelope, all.data() + pushed * layout::kFirstSlotBodyBytes,
-                              kMessages - pushed, 2, [](auto) {});
+      more = producer.pushRun([](std::size_t) { return wordsOf(kEnvelope); },
+                              all.data() + pushed * layout::kFirstSlotBodyBytes, kMessages - pushed,
+                              2, [](auto) {});
     }
     while (consumer.hasMessage()) {
-      static_cast<void>(consumer.begin());
-      taken.push_back(consumer.firstBody().first);
-      consumer.end();
-      consumer.takeLike(kEnvelope, kMost,
-                        [&](const FirstBody& body, std::uint32_t) { taken.push_back(body.first); });
+      consumer.takeRun(
+          kMost, [](const EnvelopeWords&) { return true; },
+          [&](const FirstBody& body) { taken.push_back(body.first); });
     }
     consumer.onEmpty();
   }
@@ -213,14 +247,17 @@ TEST_F(RingRunTest, PushesEachBodyWithTheEnvelope) {
   EXPECT_FALSE(consumer_.hasMessage());
 }
 
-TEST_F(RingRunTest, OnlyTheFirstMessageOfAPushIsTimed) {
-  auto timed = kEnvelope;
-  timed.sentTick = 99;
+TEST_F(RingRunTest, PushesEachMessageWithAnEnvelopeOfItsOwn) {
+  const auto words = [](std::size_t index) {
+    auto envelope = kEnvelope;
+    envelope.requestId = static_cast<std::uint32_t>(index);
+    return wordsOf(envelope);
+  };
 
-  ASSERT_EQ(producer_.pushRun(timed, bodies(10, 3).data(), 3, 0, [](auto) {}), 3u);
+  ASSERT_EQ(producer_.pushRun(words, bodies(10, 3).data(), 3, 0, [](auto) {}), 3u);
 
-  for (const auto tick : {99u, 0u, 0u}) {
-    EXPECT_EQ(consumer_.begin().sentTick, tick);
+  for (const auto id : {0u, 1u, 2u}) {
+    EXPECT_EQ(consumer_.begin().requestId, id);
     consumer_.end();
   }
 }
@@ -239,8 +276,7 @@ TEST_F(RingRunTest, PushesAndTakesBodiesAroundTheEndOfTheRing) {
     ASSERT_EQ(pushAll(pushed, 41), 41u);
     pushed += 41;
     while (consumer_.hasMessage()) {
-      ++expected;
-      for (const auto number : takeLike()) ASSERT_EQ(number, expected++);
+      for (const auto number : takeRun()) ASSERT_EQ(number, expected++);
     }
     consumer_.onEmpty();
     ASSERT_EQ(expected, pushed);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Echo: the servers of `mpf torture`. It checks every byte of each request, and answers in place,
-// with a new message, with a published one, with many values, or late.
+// several requests together, with a new message, with a published one, with many values, or late.
 //
 // Threads  one.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include <mpf/message_server.h>
@@ -23,7 +24,7 @@ class Echo {
   void handleAll();
 
  private:
-  void handle(Message&& request);
+  void answer(std::span<OutOfBand> requests);
   void answer(Int32Message&& request);
   void answerMany(const Int32Message& answer);
   void answer(Float64ArrayMessage&& request);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "tools/torture/talk.h"
 
+#include <algorithm>
+#include <array>
 #include <fmt/format.h>
 #include <thread>
 #include <utility>
@@ -13,8 +15,11 @@ constexpr std::size_t kSeveralSlots = 9;  // elements of an array that needs sev
 constexpr std::size_t kLarge = 300;       // elements of an array that needs a chunk
 constexpr unsigned kCancelEvery = 32;
 constexpr unsigned kBurstEvery = 16;
+constexpr unsigned kRunEvery = 4;
+constexpr std::size_t kRun = 20;  // requests that are sent together, as values
 constexpr const char* kNoRequest =
     "a reply or fate arrived for a request that had ended or was never sent";
+constexpr const char* kReusedId = "a request got the id of another request that is still open";
 constexpr std::size_t kBurst = 80;  // open requests whose replies fill the first ring
 
 }  // namespace
@@ -39,6 +44,8 @@ Talk::Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::stri
 
 void Talk::sendSome() {
   if (random_() % kBurstEvery == 0) sendBurst();
+  if (random_() % kRunEvery == 0 && !sendRun<Int32>()) return;
+  if (random_() % kRunEvery == 0 && !sendRun<OutOfBand>()) return;
   while (open_.size() < kOpen && sendOne()) {
   }
 }
@@ -92,12 +99,30 @@ bool Talk::sendOne() {
   const auto deadline = random_() % 16 == 0
                             ? Deadline::after(std::chrono::microseconds(random_() % 300))
                             : Deadline::never();
+  auto request = makeMessage(value);
+  request.setClientExtra(value);
   std::uint32_t id = 0;
-  if (client_.send(makeMessage(value), deadline, &id) != SendResult::sent) return false;
-  if (!open_.emplace(id, value).second)
-    world_.complain("a request got the id of another request that is still open");
+  if (client_.send(std::move(request), deadline, &id) != SendResult::sent) return false;
+  if (!open_.emplace(id, value).second) world_.complain(kReusedId);
   if (random_() % kCancelEvery == 0) client_.cancel(id);
   return true;
+}
+
+// Returns false if the queue is full, or there is no connection.
+template <class T>
+bool Talk::sendRun() {
+  std::array<T, kRun> values;
+  for (auto& value : values) {
+    value.cmd = static_cast<std::int32_t>(Request::answer);
+    value.value = world_.nextValue();
+    value.address = answerTo(value.value);
+  }
+  std::array<std::uint32_t, kRun> ids{};
+  const auto sent = client_.sendMany<T>(values, Deadline::never(), ids);
+  for (std::size_t i = 0; i < sent.count; ++i) {
+    if (!open_.emplace(ids[i], values[i].value).second) world_.complain(kReusedId);
+  }
+  return sent.result == SendResult::sent;
 }
 
 bool Talk::trySendDie() {
@@ -122,19 +147,25 @@ void Talk::take(const Message& message) {
   takeReply(value, message);
 }
 
-// A server sends all values of one answer before it answers another request. The first value does
-// not arrive if the request has had its fate.
+// Only requests that are sent as values have no marks.
 void Talk::takeValues(std::span<const Int32> values, const Message& first) {
-  const auto id = first.route().requestId;
-  if ((first.route().flags & kEndsRequest) != 0) {
+  const bool endsRequest = (first.route().flags & kEndsRequest) != 0;
+  if (endsRequest && first.getClientExtra() == 0) return takeAnswers(values);
+  if (endsRequest) {
     take(first);
-    lastId_ = id;
     last_ = values.front();
     values = values.subspan(1);
-  } else if (std::exchange(lastId_, id) != id) {
+  } else if (first.route().requestId != lastId_) {
     last_ = values.front();
     last_.extra = 0;
   }
+  lastId_ = first.route().requestId;
+  takeFurther(values);
+}
+
+// A server sends all values of one answer before it answers another request. The first value does
+// not arrive if the request has had its fate.
+void Talk::takeFurther(std::span<const Int32> values) {
   for (const auto& value : values) {
     if (value.cmd != static_cast<std::int32_t>(Request::answerMany)) {
       world_.complain(kNoRequest);
@@ -142,6 +173,16 @@ void Talk::takeValues(std::span<const Int32> values, const Message& first) {
       world_.complain(fmt::format("value {} of the answer {} does not follow its former one",
                                   value.extra, value.value));
     }
+  }
+}
+
+// The values are first replies to requests without marks, which were sent together, in their order.
+void Talk::takeAnswers(std::span<const Int32> values) {
+  for (const auto& value : values) {
+    const auto found = std::ranges::find(open_, answerTo(value.value), &Open::value_type::second);
+    if (found == open_.end()) return world_.complain(kNoRequest);
+    open_.erase(found);
+    ++talked_.replies;
   }
 }
 
@@ -158,11 +199,17 @@ void Talk::takeFate(std::int32_t value, Fate fate) {
   if (fate == Fate::neverTaken || fate == Fate::expired) world_.noteNeverTaken(value);
 }
 
+void Talk::takeNumber(std::int32_t value, std::int32_t answer) {
+  if (answer != answerTo(value))
+    world_.complain(fmt::format("the reply to {} is {}", value, answer));
+}
+
 void Talk::takeReply(std::int32_t value, const Message& reply) {
   ++talked_.replies;
   if (const auto* number = reply.tryAs<Int32>()) {
-    if (number->value != answerTo(value))
-      world_.complain(fmt::format("the reply to {} is {}", value, number->value));
+    takeNumber(value, number->value);
+  } else if (const auto* other = reply.tryAs<OutOfBand>()) {
+    takeNumber(value, other->value);
   } else if (const auto* array = reply.tryAs<Float64Array>();
              array == nullptr || array->extra != answerTo(value)) {
     world_.complain(fmt::format("the reply to {} is not a reply of its server", value));

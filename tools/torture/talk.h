@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Talk: the messages of one client to one server: requests of all sizes, some of them kept,
-// expired, cancelled, or answered with many values. It checks that each request ends exactly once:
-// with its own reply, or with a true fate; and that the values of an answer are in order.
+// Talk: the messages of one client to one server: requests of all sizes, sent alone or as a run of
+// values, some of them kept, expired, cancelled, or answered with many values. It checks that each
+// request ends exactly once: with its own reply, or with a true fate; and that the values of an
+// answer are in order.
 //
 // Threads  the dispatcher's.
 #pragma once
@@ -42,19 +43,25 @@ class Talk {
 
  private:
   void sendBurst();
+  template <class T>
+  [[nodiscard]] bool sendRun();
   [[nodiscard]] bool sendOne();
   [[nodiscard]] Message makeMessage(std::int32_t value);
   [[nodiscard]] Message makeArray(std::int32_t value, std::size_t length, bool inPool);
   void take(const Message& message);
   void takeValues(std::span<const Int32> values, const Message& first);
+  void takeAnswers(std::span<const Int32> values);
+  void takeFurther(std::span<const Int32> values);
   void takeConnect(ConnectStatus status);
   void takeFate(std::int32_t value, Fate fate);
   void takeReply(std::int32_t value, const Message& reply);
+  void takeNumber(std::int32_t value, std::int32_t answer);
 
   World& world_;
   Talked& talked_;
   std::mt19937 random_;
-  std::map<std::uint32_t, std::int32_t> open_;  // values by request id
+  using Open = std::map<std::uint32_t, std::int32_t>;  // values by request id
+  Open open_;
   bool losing_ = false;
   std::uint32_t lastId_ = 0;  // of the last Int32
   Int32 last_{};

@@ -44,6 +44,13 @@ template <class Value>
   const bool isLittle = std::endian::native == std::endian::little;
   return isLittle ? widened(first) | widened(second) << 32 : widened(first) << 32 | widened(second);
 }
+// The two numbers of joined().
+[[nodiscard]] constexpr std::uint32_t firstOf(std::uint64_t both) noexcept {
+  return static_cast<std::uint32_t>(std::endian::native == std::endian::little ? both : both >> 32);
+}
+[[nodiscard]] constexpr std::uint32_t secondOf(std::uint64_t both) noexcept {
+  return static_cast<std::uint32_t>(std::endian::native == std::endian::little ? both >> 32 : both);
+}
 // The number of 32 bits whose memory is that of the three numbers, one after the other.
 [[nodiscard]] inline std::uint32_t joined(std::uint16_t first, std::uint8_t second,
                                           std::uint8_t third) noexcept {

@@ -70,7 +70,32 @@ TEST_F(EchoTest, AnswersANumber) {
   EXPECT_EQ(reply.tryAs<Int32>()->value, answerTo(value));
 }
 
-// Every third array is answered with a new message, the others in their own memory.
+TEST_F(EchoTest, AnswersRequestsThatWaitTogether) {
+  std::vector<OutOfBand> values(5);
+  for (auto& value : values) {
+    value.value = world_->nextValue();
+    value.address = answerTo(value.value);
+  }
+  ASSERT_EQ(client_.sendMany<OutOfBand>(values).count, 5U);
+
+  run([&] { return ends_.size() == 5; });
+
+  for (std::size_t i = 0; i < 5; ++i) {
+    ASSERT_NE(ends_[i].tryAs<OutOfBand>(), nullptr);
+    EXPECT_EQ(ends_[i].tryAs<OutOfBand>()->value, answerTo(values[i].value));
+  }
+  EXPECT_EQ(world_->complaint(), "");
+}
+
+TEST_F(EchoTest, ComplainsOfDamagedRequestsThatWaitTogether) {
+  std::vector<OutOfBand> values(2);
+  ASSERT_EQ(client_.sendMany<OutOfBand>(values).count, 2U);
+
+  run([&] { return ends_.size() == 2; });
+
+  EXPECT_EQ(world_->complaint(), "request 0 is damaged");
+}
+
 TEST_F(EchoTest, AnswersWithManyValuesInOrder) {
   auto request = number(Request::answerMany);
   const auto value = request->value;
@@ -85,6 +110,7 @@ TEST_F(EchoTest, AnswersWithManyValuesInOrder) {
   }
 }
 
+// Every third array is answered with a new message, the others in their own memory.
 TEST_F(EchoTest, AnswersArraysWithTheirElements) {
   for (int i = 0; i < 4; ++i) {
     auto request = array(300);

@@ -18,13 +18,15 @@ class TalkWithServer : public TalkTest {
   void connect() {
     runUntil([&] { EXPECT_FALSE(server_->receive()); }, [&] { return talk_.isConnected(); });
   }
-  // Returns the next request with this body. The server refuses the requests before it.
+  // Returns the next request with this body that was sent as a message, or as one of many values.
+  // The server refuses the requests before it.
   template <class Type>
-  Message take() {
+  Message take(bool isOneOfMany = false) {
     for (;;) {
       talk_.sendSome();
       while (auto request = server_->receive()) {
-        if (request.tryAs<Type>() != nullptr) return request;
+        const bool hasMarks = request.getClientExtra() != 0;
+        if (request.tryAs<Type>() != nullptr && hasMarks != isOneOfMany) return request;
       }
       dispatcher_.runOnce(Deadline::after(std::chrono::microseconds(100)));
     }
@@ -127,6 +129,38 @@ TEST_F(TalkWithServer, ComplainsOfAValueThatDoesNotFollowItsFormerOne) {
             fmt::format("value 4 of the answer {} does not follow its former one", value.value));
 }
 
+TEST_F(TalkWithServer, AcceptsTheAnswersToManyValues) {
+  auto number = *Int32Message::tryFrom(take<Int32>(true));
+  number->value = answerTo(number->value);
+  send(std::move(number));
+  auto other = *OutOfBandMessage::tryFrom(take<OutOfBand>(true));
+  other->value = answerTo(other->value);
+  send(std::move(other));
+
+  EXPECT_EQ(complaint(), "");
+}
+
+TEST_F(TalkWithServer, ComplainsOfAWrongAnswerToOneOfManyValues) {
+  auto other = *OutOfBandMessage::tryFrom(take<OutOfBand>(true));
+  const auto value = other->value;
+  other->value = answerTo(value) + 1;
+  send(std::move(other));
+
+  EXPECT_EQ(complaint(),
+            "the reply to " + std::to_string(value) + " is " + std::to_string(answerTo(value) + 1));
+}
+
+TEST_F(TalkWithServer, ComplainsOfAnAnswerToAValueThatIsNotOpen) {
+  const auto number = take<Int32>(true);
+  auto reply = server_->allocReplyMessage<Int32>(number);
+  reply->value = 1;
+
+  EXPECT_EQ(server_->reply(std::move(reply)), ReplyResult::sent);
+  runUntil([] {}, [&] { return !complaint().empty(); });
+
+  EXPECT_EQ(complaint(), "a reply or fate arrived for a request that had ended or was never sent");
+}
+
 TEST_F(TalkWithServer, ADisconnectEndsAllRequestsAndIsCounted) {
   static_cast<void>(take<Int32>());
   talk_.sendSome();
@@ -179,16 +213,18 @@ TEST_F(TalkWithServer, AsksItsServerToKillItself) {
 TEST_F(TalkWithServer, SendsRequestsOfEachKind) {
   std::set<std::size_t> lengths;
   std::set<std::int32_t> commands;
+  std::size_t outOfBand = 0;
 
   runUntil(
       [&] {
         talk_.sendSome();
         while (const auto request = server_->receive()) {
           if (const auto* number = request.tryAs<Int32>()) commands.insert(number->cmd);
+          else if (request.tryAs<OutOfBand>() != nullptr) ++outOfBand;
           else lengths.insert(request.valueAs<Float64Array>().size());
         }
       },
-      [&] { return lengths.size() == 2 && commands.size() == 3; });
+      [&] { return lengths.size() == 2 && commands.size() == 3 && outOfBand != 0; });
 
   EXPECT_EQ(lengths, (std::set<std::size_t>{9, 300}));
   EXPECT_EQ(commands, (std::set<std::int32_t>{static_cast<std::int32_t>(Request::answer),

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// RequestRun: waiting requests of one client that a handler gets together. RunHandlers: these
+// handlers, by type.
+//
+// Threads  the server's thread.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include <mpf/message_types.h>
+
+#include "shm/envelope.h"
+#include "shm/messages/value_run.h"
+
+namespace mpf {
+
+// Changes the values, which are then sent as the replies; they lie one after the other.
+using HandleRun = std::function<void(std::span<std::byte> values)>;
+
+class RequestRun {
+ public:
+  explicit RequestRun(MessageType type) noexcept
+      : body_(EnvelopeWords::fullSlot(static_cast<std::uint16_t>(type), 0)) {}
+
+  // Adds a request, but for its value, if it can be in a run: it has the type, fills a slot and has
+  // no deadline.
+  [[nodiscard]] bool tryAdd(const EnvelopeWords& words) noexcept {
+    if (words.body != body_ || words.timeNs != 0) return false;
+    words_[count_++] = words;
+    return true;
+  }
+  void add(const FirstBody& body) noexcept { values_.add(body); }
+
+  [[nodiscard]] std::size_t size() const noexcept { return count_; }
+  [[nodiscard]] const EnvelopeWords& operator[](std::size_t index) const noexcept {
+    return words_[index];
+  }
+  [[nodiscard]] std::span<std::byte> values() noexcept { return values_.bytes(); }
+
+ private:
+  std::uint64_t body_;
+  std::size_t count_ = 0;
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): only the first `count_` have a value
+  std::array<EnvelopeWords, ValueRun::kMost> words_;
+  ValueRun values_;
+};
+
+class RunHandlers {
+ public:
+  // Null removes the handler of a type.
+  void set(MessageType type, std::shared_ptr<HandleRun> handler) {
+    handlers_.at(static_cast<std::size_t>(type)) = std::move(handler);
+  }
+  // nullptr if no handler was set for this number of a type.
+  [[nodiscard]] const HandleRun* find(std::uint16_t type) const noexcept {
+    return type < handlers_.size() ? handlers_[type].get() : nullptr;
+  }
+
+ private:
+  std::array<std::shared_ptr<HandleRun>, std::tuple_size_v<MessageTypes> + 1> handlers_;
+};
+
+}  // namespace mpf

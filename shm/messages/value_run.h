@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Bodies: the bodies of messages that are sent together. ValueRun: copies of those of messages that
+// were taken together.
+//
+// Threads  plain data.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include <mpf/message_types.h>
+
+#include "shm/envelope.h"
+
+namespace mpf {
+
+// Bodies of `size` bytes each, one after the other.
+struct Bodies {
+  MessageType type;
+  std::size_t size;
+  std::span<const std::byte> all;
+
+  [[nodiscard]] bool fillSlots() const noexcept { return size == layout::kFirstSlotBodyBytes; }
+  [[nodiscard]] std::size_t count() const noexcept { return all.size() / size; }
+  [[nodiscard]] Bodies from(std::size_t index) const noexcept {
+    return {type, size, all.subspan(index * size)};
+  }
+  [[nodiscard]] Bodies first(std::size_t count) const noexcept {
+    return {type, size, all.first(count * size)};
+  }
+};
+
+// Each body fills a slot; the copies lie one after the other.
+class ValueRun {
+ public:
+  static constexpr std::size_t kMost = 16;
+
+  void add(const FirstBody& body) noexcept { body.copyTo(values_[count_++].data()); }
+  [[nodiscard]] std::size_t size() const noexcept { return count_; }
+  [[nodiscard]] std::span<std::byte> bytes() noexcept {
+    return std::as_writable_bytes(std::span(values_).first(count_));
+  }
+
+ private:
+  std::size_t count_ = 0;
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): only the first `count_` have a value
+  alignas(8) std::array<std::array<std::byte, layout::kFirstSlotBodyBytes>, kMost> values_;
+};
+
+}  // namespace mpf

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: MIT
+// MessageServer::on() with a handler of several requests.
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "tests/client/client_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using testing::ElementsAre;
+
+class RequestRuns : public ClientTest {
+ protected:
+  // Starts a server whose handler records the values, and answers with 100 + value.
+  void start(ServerOptions options = {}) {
+    startServer(options).on<Int32>([this](std::span<Int32> requests) {
+      std::vector<std::int32_t> values;
+      for (auto& request : requests) {
+        values.push_back(request.value);
+        request.value += 100;
+      }
+      runs_.push_back(values);
+      if (onCall_) onCall_();
+    });
+    bind();
+  }
+  void send(std::int32_t value, Deadline takeBefore = Deadline::never()) {
+    Int32Message request({.value = value});
+    request.setClientType(10 * value);
+    request.setClientExtra(-value);
+    ASSERT_EQ(client_.send(std::move(request), takeBefore, &ids_.emplace_back()), SendResult::sent);
+  }
+  void expectReply(std::int32_t value) {
+    const auto reply = next();
+    ASSERT_NE(reply.tryAs<Int32>(), nullptr);
+    EXPECT_EQ(reply.tryAs<Int32>()->value, 100 + value);
+    EXPECT_EQ(reply.getClientType(), 10 * value);
+    EXPECT_EQ(reply.getClientExtra(), -value);
+    EXPECT_EQ(reply.route().requestId, ids_.at(static_cast<std::size_t>(value)));
+    EXPECT_NE(reply.route().flags & kEndsRequest, 0u);
+  }
+
+  std::vector<std::vector<std::int32_t>> runs_;
+  std::vector<std::uint32_t> ids_;
+  std::function<void()> onCall_;
+};
+
+TEST_F(RequestRuns, AreAnsweredInOrderWithTheMarksOfEach) {
+  start();
+  for (std::int32_t i = 0; i < 3; ++i) send(i);
+
+  EXPECT_TRUE(server_->handleOne());
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0, 1, 2)));
+  EXPECT_FALSE(server_->handleOne());
+  for (std::int32_t i = 0; i < 3; ++i) expectReply(i);
+}
+
+TEST_F(RequestRuns, OfOneRequestAreAnsweredAlike) {
+  start();
+  send(0);
+
+  EXPECT_TRUE(server_->handleOne());
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0)));
+  expectReply(0);
+}
+
+TEST_F(RequestRuns, HaveUpTo16Requests) {
+  start();
+  for (std::int32_t i = 0; i < 40; ++i) send(i);
+
+  while (server_->handleOne()) {
+  }
+
+  std::size_t requests = 0;
+  for (const auto& run : runs_) {
+    EXPECT_LE(run.size(), 16u);
+    requests += run.size();
+  }
+  EXPECT_EQ(requests, 40u);
+  EXPECT_LE(runs_.size(), 4u);
+  for (std::int32_t i = 0; i < 40; ++i) expectReply(i);
+}
+
+TEST_F(RequestRuns, AreCounted) {
+  start();
+  for (std::int32_t i = 0; i < 5; ++i) send(i);
+  server_->handleOne();
+  for (std::int32_t i = 0; i < 5; ++i) expectReply(i);
+
+  // The client counts its replies in its own window.
+  EXPECT_EQ(sumOf(&layout::WindowControl::received), 10u);
+  EXPECT_EQ(sumOf(&layout::WindowControl::sent), 5u);
+}
+
+TEST_F(RequestRuns, EndAtARequestOfAnotherType) {
+  start();
+  int others = 0;
+  server_->on<OutOfBand>([&](OutOfBand&) { ++others; });
+  send(0);
+  send(1);
+  ASSERT_EQ(client_.send(OutOfBandMessage()), SendResult::sent);
+  ids_.emplace_back();
+  ids_.emplace_back();
+  send(2);
+
+  server_->handleOne();
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0, 1)));
+  server_->handleOne();
+  EXPECT_EQ(others, 1);
+  while (server_->handleOne()) {
+  }
+  EXPECT_EQ(runs_.size(), 2u);
+  for (int i = 0; i < 4; ++i) next();
+}
+
+TEST_F(RequestRuns, EndAtARequestWithADeadline) {
+  start();
+  send(0);
+  send(1);
+  send(2, Deadline::after(1h));
+  send(3);
+
+  while (server_->handleOne()) {
+  }
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0, 1), ElementsAre(2), ElementsAre(3)));
+  for (std::int32_t i = 0; i < 4; ++i) expectReply(i);
+}
+
+TEST_F(RequestRuns, DoNotContainAnExpiredRequest) {
+  start();
+  send(0);
+  send(1, Deadline::atNs(1));
+  send(2);
+
+  while (server_->handleOne()) {
+  }
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0), ElementsAre(2)));
+  std::vector<std::optional<Fate>> fates;
+  for (int i = 0; i < 3; ++i) fates.push_back(fateOf(next()));
+  EXPECT_THAT(fates, testing::UnorderedElementsAre(std::nullopt, Fate::expired, std::nullopt));
+}
+
+TEST_F(RequestRuns, AreRefusedIfTheHandlerThrows) {
+  start();
+  for (std::int32_t i = 0; i < 3; ++i) send(i);
+  onCall_ = [] { throw std::runtime_error("the handler throws"); };
+
+  EXPECT_THROW(server_->handleOne(), std::runtime_error);
+  onCall_ = nullptr;
+  send(3);
+  send(4);
+  server_->handleOne();
+
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(fateOf(next()), Fate::refused);
+  expectReply(3);
+  expectReply(4);
+}
+
+TEST_F(RequestRuns, MayArriveWhileTheirHandlerReceives) {
+  start();
+  for (std::int32_t i = 0; i < 3; ++i) send(i);
+  int depth = 0;
+  onCall_ = [&] {
+    if (++depth > 1) return;
+    send(3);
+    send(4);
+    EXPECT_TRUE(server_->handleOne());
+  };
+
+  server_->handleOne();
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0, 1, 2), ElementsAre(3, 4)));
+  for (const auto i : {3, 4, 0, 1, 2}) expectReply(i);
+}
+
+TEST_F(RequestRuns, HaveNoReplyIfTheirClientHasLeft) {
+  start();
+  auto other = std::make_unique<MessageClient>(dispatcher_, [](Message&&) { FAIL(); });
+  dispatcher_.runOnce(Deadline::atNs(0));
+  int connects = 0;
+  other = std::make_unique<MessageClient>(dispatcher_, [&](Message&& message) {
+    connects += message.getType() == MessageType::connect ? 1 : 100;
+  });
+  other->bind("device[0]/a");
+  runUntil([&] { return other->isConnected(); });
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(other->send(Int32Message()), SendResult::sent);
+  onCall_ = [&] {
+    other.reset();
+    while (server_->receive()) {
+    }
+  };
+
+  server_->handleOne();
+  onCall_ = nullptr;
+  send(0);
+  send(1);
+  server_->handleOne();
+
+  EXPECT_EQ(connects, 1);
+  EXPECT_EQ(runs_.size(), 2u);
+  expectReply(0);
+  expectReply(1);
+}
+
+TEST_F(RequestRuns, HaveTheTimeOfTheirSendingIfTheServerStampsReplies) {
+  start({.stampsReplies = true});
+  const auto before = Clock::wallNs();
+  for (std::int32_t i = 0; i < 3; ++i) send(i);
+  server_->handleOne();
+  const auto after = Clock::wallNs();
+
+  for (std::int32_t i = 0; i < 3; ++i) {
+    const auto reply = next();
+    EXPECT_GE(reply.getTimeStampNs(), before);
+    EXPECT_LE(reply.getTimeStampNs(), after);
+  }
+}
+
+TEST_F(RequestRuns, EndWithAnotherHandler) {
+  start();
+  for (std::int32_t i = 0; i < 2; ++i) send(i);
+  int calls = 0;
+  server_->on<Int32>([&](Int32& request) {
+    request.value += 100;
+    ++calls;
+  });
+
+  while (server_->handleOne()) {
+  }
+
+  EXPECT_EQ(calls, 2);
+  EXPECT_THAT(runs_, testing::IsEmpty());
+  expectReply(0);
+  expectReply(1);
+}
+
+TEST_F(RequestRuns, AreNotReceivedTogetherWithoutAHandler) {
+  start();
+  for (std::int32_t i = 0; i < 2; ++i) send(i);
+
+  auto request = server_->receive();
+  ASSERT_TRUE(request);
+  request.tryAs<Int32>()->value += 100;
+  EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+  while (server_->handleOne()) {
+  }
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(1)));
+  expectReply(0);
+  expectReply(1);
+}
+
+TEST_F(RequestRuns, OfLongerValuesHaveOneRequestEach) {
+  std::vector<std::size_t> sizes;
+  startServer().on<Float64>([&](std::span<Float64> requests) {
+    sizes.push_back(requests.size());
+    for (auto& request : requests) request.value *= 2;
+  });
+  bind();
+  for (int i = 0; i < 2; ++i)
+    ASSERT_EQ(client_.send(Float64Message({.value = 1.0 + i})), SendResult::sent);
+
+  while (server_->handleOne()) {
+  }
+
+  EXPECT_THAT(sizes, ElementsAre(1, 1));
+  EXPECT_EQ(next().tryAs<Float64>()->value, 2.0);
+  EXPECT_EQ(next().tryAs<Float64>()->value, 4.0);
+}
+
+TEST_F(RequestRuns, AreTakenByRun) {
+  start();
+  for (std::int32_t i = 0; i < 3; ++i) send(i);
+  onCall_ = [&] { server_->interrupt(); };
+
+  server_->run();
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0, 1, 2)));
+  for (std::int32_t i = 0; i < 3; ++i) expectReply(i);
+}
+
+}  // namespace
+}  // namespace mpf::test
