@@ -85,6 +85,19 @@ TEST_F(RequestRuns, HaveUpTo16Requests) {
   for (std::int32_t i = 0; i < 40; ++i) expectReply(i);
 }
 
+// The server claims the lines of replies in groups, which end within the runs.
+TEST_F(RequestRuns, MayBeginAnywhereInTheRing) {
+  start();
+  std::int32_t sent = 0;
+  std::int32_t answered = 0;
+  for (int round = 0; round < 30; ++round) {
+    for (const auto end = sent + 3 + round % 14; sent < end; ++sent) send(sent);
+    while (server_->handleOne()) {
+    }
+    while (answered < sent) expectReply(answered++);
+  }
+}
+
 TEST_F(RequestRuns, AreCounted) {
   start();
   for (std::int32_t i = 0; i < 5; ++i) send(i);
@@ -179,33 +192,44 @@ TEST_F(RequestRuns, MayArriveWhileTheirHandlerReceives) {
   for (const auto i : {3, 4, 0, 1, 2}) expectReply(i);
 }
 
-TEST_F(RequestRuns, HaveNoReplyIfTheirClientHasLeft) {
+// The next client gets the same connection object, and numbers its requests alike.
+TEST_F(RequestRuns, AreNotAnsweredToTheNextClient) {
   start();
-  auto other = std::make_unique<MessageClient>(dispatcher_, [](Message&&) { FAIL(); });
-  dispatcher_.runOnce(Deadline::atNs(0));
-  int connects = 0;
-  other = std::make_unique<MessageClient>(dispatcher_, [&](Message&& message) {
-    connects += message.getType() == MessageType::connect ? 1 : 100;
-  });
-  other->bind("device[0]/a");
-  runUntil([&] { return other->isConnected(); });
-  for (int i = 0; i < 3; ++i) ASSERT_EQ(other->send(Int32Message()), SendResult::sent);
-  onCall_ = [&] {
-    other.reset();
-    while (server_->receive()) {
+  std::vector<std::int32_t> answers;
+  const auto count = [&](const Message& message) {
+    if (const auto* value = message.tryAs<Int32>()) answers.push_back(value->value);
+  };
+  auto first = std::make_unique<MessageClient>(dispatcher_, count);
+  MessageClient second(dispatcher_, count);
+  std::vector<Message> held;
+  const auto receiveUntil = [&](const auto& condition) {
+    while (!condition()) {
+      if (auto request = server_->receive()) held.push_back(std::move(request));
+      dispatcher_.runOnce(Deadline::after(100us));
     }
+  };
+  first->bind("device[0]/a");
+  receiveUntil([&] { return first->isConnected(); });
+  ASSERT_EQ(first->send(Int32Message()), SendResult::sent);
+  receiveUntil([&] { return held.size() == 1; });
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(first->send(Int32Message()), SendResult::sent);
+  onCall_ = [&] {
+    const auto client = server_->clientOf(held.at(0));
+    first.reset();
+    receiveUntil([&] { return server_->clientOf(held.at(0)) != client; });
+    held.clear();
+    second.bind("device[0]/a");
+    receiveUntil([&] { return second.isConnected(); });
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(second.send(Int32Message()), SendResult::sent);
+    receiveUntil([&] { return held.size() == 4; });
   };
 
   server_->handleOne();
-  onCall_ = nullptr;
-  send(0);
-  send(1);
-  server_->handleOne();
 
-  EXPECT_EQ(connects, 1);
-  EXPECT_EQ(runs_.size(), 2u);
-  expectReply(0);
-  expectReply(1);
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(0, 0, 0)));
+  for (auto& request : held) EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+  receiveUntil([&] { return answers.size() == 4; });
+  EXPECT_THAT(answers, ElementsAre(0, 0, 0, 0)) << "100 is the answer to a request of the first";
 }
 
 TEST_F(RequestRuns, HaveTheTimeOfTheirSendingIfTheServerStampsReplies) {
