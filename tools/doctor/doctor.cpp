@@ -34,9 +34,9 @@ nlohmann::json toJson(const std::vector<Finding>& findings) {
   return list;
 }
 
-int examine(bool json) {
+int examine(bool asJson) {
   const auto findings = runDoctorChecks(Host());
-  if (json) fmt::print("{}\n", jsonText(toJson(findings)));
+  if (asJson) fmt::print("{}\n", jsonText(toJson(findings)));
   else
     for (const auto& finding : findings) print(finding);
   return std::ranges::any_of(

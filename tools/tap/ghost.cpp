@@ -28,8 +28,8 @@ void announce(const GhostOptions& options, const std::string& name, const GhostS
   std::fflush(stdout);
 }
 
-void report(const GhostCounts& counts, bool json) {
-  if (json) {
+void report(const GhostCounts& counts, bool asJson) {
+  if (asJson) {
     const nlohmann::json tree{{"requests", counts.requests},
                               {"similar", counts.similar},
                               {"unknown", counts.unknown},

@@ -91,10 +91,10 @@ class JsonSink final : public TapSink {
   }
 
  private:
-  static void add(std::int64_t atNs, const TappedLink& link, nlohmann::json json) {
-    json["at_ns"] = atNs;
-    json["link"] = fmt::format("{:016x}", link.incarnation);
-    show(jsonText(json, -1) + "\n");
+  static void add(std::int64_t atNs, const TappedLink& link, nlohmann::json event) {
+    event["at_ns"] = atNs;
+    event["link"] = fmt::format("{:016x}", link.incarnation);
+    show(jsonText(event, -1) + "\n");
   }
 };
 
