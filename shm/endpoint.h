@@ -7,8 +7,8 @@
 //   control events, which are not of a link: Knocks, and local events such as a death (PeerWindows)
 //
 // Idle links cost nothing, however many there are: the endpoint looks at a link that it does not
-// poll only when its ready bit is set. Links take turns; a server takes one message in a turn, a
-// dispatcher up to 16, or runs of up to 16 values.
+// poll only when its ready bit is set. Links take turns; a server takes one message in a turn, or a
+// run of up to 16, a dispatcher up to 16 messages or runs.
 //
 // Threads  one owner thread; interrupt() may be called by any thread and by a signal handler.
 // Crash    the watcher reports a peer's death as a local event: takeLocalEvent(), takePeerDeath().
