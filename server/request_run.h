@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RequestRun: waiting requests of one client that a handler gets together. RunHandlers: these
-// handlers, by type.
+// RequestRun: waiting requests of one client that a handler gets together. RunHandlers: the
+// handlers of such requests, by message type.
 //
 // Threads  the server's thread.
 #pragma once
@@ -29,8 +29,8 @@ class RequestRun {
   explicit RequestRun(MessageType type) noexcept
       : body_(EnvelopeWords::fullSlot(static_cast<std::uint16_t>(type), 0)) {}
 
-  // Adds a request, but for its value, if it can be in a run: it has the type, fills a slot and has
-  // no deadline.
+  // Adds a request without its value. Returns false if its type or length differs, or it has a
+  // deadline.
   [[nodiscard]] bool tryAdd(const EnvelopeWords& words) noexcept {
     if (words.body != body_ || words.timeNs != 0) return false;
     words_[count_++] = words;

@@ -97,8 +97,8 @@ class MessageClient {
   //
   //   values  at least one, in the order of the replies; copies, valid until the callback returns
   //   first   the message of the first value. Its clientType, clientExtra and time stamp are those
-  //           of all values. If it is the first reply to its request, all requests of these values
-  //           have ended
+  //           of all values, which are replies to its request, or each the first reply to another
+  //           one. A request has ended after its first reply
   //   throws  std::invalid_argument when `callback` is empty, std::logic_error when the client is
   //           bound already, or onValues() was called before, for any type
   // A callback that throws has received all of the values.
@@ -136,10 +136,11 @@ class MessageClient {
                     std::span<std::uint32_t> requestIds = {}) noexcept;
 
   // Sends each of `values` as a request, in order, until one is not sent: for a client with many
-  // requests of a few numbers each. Faster than a message for each of them. Their clientType and
-  // clientExtra are 0: the numbers in a value must tell which request a reply answers.
+  // small requests. If T is Int32 or OutOfBand, faster than a message for each of them while both
+  // sides poll. The clientType and clientExtra of the requests are 0: a field of the value must
+  // identify the request in its reply, and its number identifies it in a fate.
   //
-  //   client.sendMany<mpf::Int32>(settings);  // std::vector<mpf::Int32> settings
+  //   const auto sent = client.sendMany<mpf::Int32>(settings);  // std::vector<mpf::Int32> settings
   //
   //   takeBefore, requestIds  as above
   template <ScalarBody T>

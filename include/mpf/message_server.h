@@ -21,9 +21,10 @@
 //          published messages that it held are freed at once.
 // Trust    a client that sends invalid data loses its connection; other clients are not affected.
 // Throws   an exception that leaves a handler leaves run(), runUntilSignal() or handleOne(); the
-//          request, if it has had no reply, ends as `refused`. An exception that leaves the
-//          callback of onClient() leaves receive(). Nothing else is lost, and the next call
-//          continues with the remaining requests. Clients follow the same rule: see Dispatcher.
+//          requests that it was called with, if they had no reply, end as `refused`. An exception
+//          that leaves the callback of onClient() leaves receive(). Nothing else is lost, and the
+//          next call continues with the remaining requests. Clients follow the same rule: see
+//          Dispatcher.
 #pragma once
 
 #include <array>
@@ -216,10 +217,11 @@ class MessageServer {
   //   T&               the fields of one request, which is then sent as the reply
   //   MessageOf<T>&    one request, with its elements and marks, which is then sent as the reply
   //   MessageOf<T>&&   the same; the handler owns the request and replies to it, now or later
-  //   std::span<T>     the fields of 1 to 16 waiting requests of one client, which are then sent as
-  //                    the replies, in order. Only for scalars. Faster for a client that sends many
-  //                    requests; no reply is sent before all of them are handled. A request comes
-  //                    alone if it has a deadline, or T is neither Int32 nor OutOfBand
+  //   std::span<T>     the fields of 1 to 16 waiting requests of one client; T is a scalar. They are
+  //                    sent as the replies, in order, after the handler has returned. A request
+  //                    comes alone if it has a deadline, or T is neither Int32 nor OutOfBand. More
+  //                    requests a second than with T& while both sides poll, fewer with
+  //                    WaitMode::block
   template <MessageBody T, class Handler>
   void on(Handler handler) {
     setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
@@ -250,13 +252,13 @@ class MessageServer {
           handler(std::span(reinterpret_cast<T*>(values.data()), values.size() / sizeof(T)));
         });
   }
-  // Handles requests until interrupt(), which takes effect between two requests. Refuses requests
-  // of a type that has no handler.
+  // Handles requests until interrupt(), which takes effect between two calls of a handler. Refuses
+  // requests of a type that has no handler.
   //   throws  what a handler throws; the other requests wait until run() is called again
   void run();
   // As run(), until SIGINT or SIGTERM. Returns the exit status of a program: 0.
   int runUntilSignal();
-  // Handles one request without waiting; returns false when no request waits.
+  // Calls one handler, without waiting; returns false when no request waits.
   //   throws  what its handler throws
   bool handleOne();
 

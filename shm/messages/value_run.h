@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Bodies: the bodies of messages that are sent together. ValueRun: copies of those of messages that
-// were taken together.
+// Bodies: message bodies to send together. ValueRun: copies of message bodies that were taken
+// together.
 //
 // Threads  plain data.
 #pragma once

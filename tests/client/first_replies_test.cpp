@@ -28,7 +28,7 @@ class FirstReplies : public ValueRuns {
     std::int32_t value = 0;
     for (const auto& request : requests) reply(request, value++);
   }
-  // What a faulty server may do. All messages have one slot.
+  // Sends the last reply again, as a faulty server may. Each reply fills one slot.
   void repeatLastReply() {
     for (const auto& name : backplane_.segmentNames()) {
       const auto parsed = SegmentName::tryParse(name);
@@ -129,7 +129,7 @@ TEST_F(FirstReplies, WithAnotherTimeStampArriveApart) {
   EXPECT_THAT(valuesOfRuns(), ElementsAre(ElementsAre(0, 1), ElementsAre(2)));
 }
 
-// A server that sends a second first reply: it arrives as a reply to a request that has ended.
+// A faulty server sends a first reply twice: the second one is not delivered.
 TEST_F(FirstReplies, ToOneRequestAreDeliveredOnce) {
   startServer();
   const auto requests = held(2);

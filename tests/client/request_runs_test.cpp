@@ -104,7 +104,7 @@ TEST_F(RequestRuns, AreCounted) {
   server_->handleOne();
   for (std::int32_t i = 0; i < 5; ++i) expectReply(i);
 
-  // The client counts its replies in its own window.
+  // 5 requests at the server, and 5 replies at the client.
   EXPECT_EQ(sumOf(&layout::WindowControl::received), 10u);
   EXPECT_EQ(sumOf(&layout::WindowControl::sent), 5u);
 }
@@ -175,7 +175,7 @@ TEST_F(RequestRuns, AreRefusedIfTheHandlerThrows) {
   expectReply(4);
 }
 
-TEST_F(RequestRuns, MayArriveWhileTheirHandlerReceives) {
+TEST_F(RequestRuns, MayNest) {
   start();
   for (std::int32_t i = 0; i < 3; ++i) send(i);
   int depth = 0;
@@ -192,7 +192,7 @@ TEST_F(RequestRuns, MayArriveWhileTheirHandlerReceives) {
   for (const auto i : {3, 4, 0, 1, 2}) expectReply(i);
 }
 
-// The next client gets the same connection object, and numbers its requests alike.
+// The next client gets the same connection object, and uses the same request numbers.
 TEST_F(RequestRuns, AreNotAnsweredToTheNextClient) {
   start();
   std::vector<std::int32_t> answers;

@@ -56,7 +56,7 @@ TEST_F(SendValues, AreRequestsInOrderWithoutMarks) {
   expectReplies(20);
 }
 
-TEST_F(SendValues, FillsFewerNumbersThanValues) {
+TEST_F(SendValues, FillAShorterSpanOfNumbers) {
   startEcho();
   std::array<std::uint32_t, 2> ids{};
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Echo: the servers of `mpf torture`. It checks every byte of each request, and answers in place,
-// several requests together, with a new message, with a published one, with many values, or late.
+// Echo: the servers of `mpf torture`. It checks the contents of each request. It replies in place,
+// to several requests together, with a new or a published message, with many values, or late.
 //
 // Threads  one.
 #pragma once

@@ -32,7 +32,7 @@ class Talk {
   Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server,
        std::uint32_t seed);
 
-  // Sends requests until some are open, or the queue is full; now and then more of them at once.
+  // Sends requests until some are open, or the queue is full; sometimes in a burst or a run.
   void sendSome();
   // Asks the server to kill itself. Returns false if its queue is full.
   [[nodiscard]] bool trySendDie();
