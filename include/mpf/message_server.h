@@ -217,7 +217,7 @@ class MessageServer {
   //   T&               the fields of one request, which is then sent as the reply
   //   MessageOf<T>&    one request, with its elements and marks, which is then sent as the reply
   //   MessageOf<T>&&   the same; the handler owns the request and replies to it, now or later
-  //   std::span<T>     the fields of 1 to 16 waiting requests of one client; T is a scalar. They are
+  //   std::span<T>     the fields of up to 16 waiting requests of one client, scalars. They are
   //                    sent as the replies, in order, after the handler has returned. A request
   //                    comes alone if it has a deadline, or T is neither Int32 nor OutOfBand. More
   //                    requests a second than with T& while both sides poll, fewer with
