@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/message_server.h>
 
+#include <algorithm>
+#include <array>
 #include <fmt/format.h>
 #include <stdexcept>
 
@@ -76,9 +78,14 @@ void MessageServer::setRunHandler(MessageType type, std::size_t size,
                                   std::function<void(std::span<std::byte>)> handler) {
   const auto handle = std::make_shared<HandleRun>(std::move(handler));
   setHandler(type, [this, fields, handle](Message&& request) {
-    const auto value = fields(request);
-    if (value.empty()) return refuse(std::move(request));
+    const auto original = fields(request);
+    if (original.empty()) return refuse(std::move(request));
+    // A copy, as in a run: a body in shared memory may change.
+    alignas(8) std::array<std::byte, Message::kInlineBytes> bytes;
+    const auto value = std::span(bytes).first(original.size());
+    std::ranges::copy(original, value.begin());
     (*handle)(value);
+    std::ranges::copy(value, original.begin());
     static_cast<void>(reply(std::move(request)));
   });
   if (size == layout::kFirstSlotBodyBytes) core_->setRunHandler(type, handle);
@@ -95,7 +102,7 @@ bool MessageServer::handleOne() {
 void MessageServer::handle(Message&& request) {
   const auto type = static_cast<std::size_t>(request.getType());
   if (type >= handlers_.size() || !handlers_[type]) return refuse(std::move(request));
-  // If it throws, it has destroyed the request, which has refused it.
+  // If it throws, the request is destroyed without a reply, which refuses it.
   core_->callHandler([&] { handlers_[type](std::move(request)); });
 }
 

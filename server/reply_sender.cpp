@@ -19,10 +19,6 @@ auto noteSent(Link& link) noexcept {
   };
 }
 
-// Of EnvelopeWords::body.
-const std::uint64_t kFirstReply =
-    EnvelopeWords::fullSlot(0, layout::kSlotFirstReply) ^ EnvelopeWords::fullSlot(0, 0);
-
 }  // namespace
 
 ReplyResult ReplySender::send(Message& message) noexcept {
@@ -129,8 +125,9 @@ void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& req
     if (sentNs != 0) timed.client = untimed.clientWith(Tick::ofSample(sentNs));
     return timed;
   };
-  const Link::Limits limits{0, link.slotsOfFirstReplies()};
   for (const auto count = bodies.count(); sent.count < count;) {
+    // A run may end with the move to the second ring, where more slots are reserved.
+    const Link::Limits limits{0, link.slotsOfFirstReplies()};
     const auto run = link.trySendRun(words, bodies.from(sent.count).all, limits, noteSent(link));
     if (run == 0) {
       sent.result = noteRefused(LinkSend::full);
@@ -142,6 +139,7 @@ void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& req
 
 void ReplySender::sendRun(Connection& connection, std::uint32_t generation,
                           RequestRun& run) noexcept {
+  if (forkGuard_.isInherited()) return;
   std::size_t sent = 0;
   {
     const BiasedLock::Guard lock(*connection.lock);
@@ -157,11 +155,12 @@ void ReplySender::sendRun(Connection& connection, std::uint32_t generation,
 std::size_t ReplySender::sendRunLocked(Connection& connection, RequestRun& run) noexcept {
   auto& link = connection.channel->link();
   const auto stamp = stamps_ ? static_cast<std::uint64_t>(Clock::wallNs()) : 0;
+  const auto body =
+      EnvelopeWords::fullSlot(static_cast<std::uint16_t>(run.type()), layout::kSlotFirstReply);
   std::size_t sent = 0;
   const auto words = [&](std::size_t index, std::int64_t sentNs) {
     const auto& request = run[sent + index];
-    return EnvelopeWords{request.body | kFirstReply, request.request,
-                         request.clientWith(Tick::ofSample(sentNs)), stamp};
+    return EnvelopeWords{body, request.request, request.clientWith(Tick::ofSample(sentNs)), stamp};
   };
   const Link::Batch batch(link);
   while (sent < run.size()) {
@@ -181,6 +180,7 @@ std::size_t ReplySender::sendRunLocked(Connection& connection, RequestRun& run) 
 
 void ReplySender::refuse(Connection& connection, std::uint32_t generation, const RequestRun& run,
                          std::size_t index) noexcept {
+  if (forkGuard_.isInherited()) return;
   for (; index < run.size(); ++index)
     refuseAbandoned({reinterpret_cast<std::uint64_t>(&connection), run[index].requestId(),
                      generation, nullptr});

@@ -27,7 +27,9 @@ using HandleRun = std::function<void(std::span<std::byte> values)>;
 class RequestRun {
  public:
   explicit RequestRun(MessageType type) noexcept
-      : body_(EnvelopeWords::fullSlot(static_cast<std::uint16_t>(type), 0)) {}
+      : type_(type), body_(EnvelopeWords::fullSlot(static_cast<std::uint16_t>(type), 0)) {}
+
+  [[nodiscard]] MessageType type() const noexcept { return type_; }
 
   // Adds a request without its value. Returns false if its type or length differs, or it has a
   // deadline.
@@ -45,6 +47,7 @@ class RequestRun {
   [[nodiscard]] std::span<std::byte> values() noexcept { return values_.bytes(); }
 
  private:
+  MessageType type_;
   std::uint64_t body_;
   std::size_t count_ = 0;
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): only the first `count_` have a value
@@ -59,8 +62,8 @@ class RunHandlers {
     handlers_.at(static_cast<std::size_t>(type)) = std::move(handler);
   }
   // nullptr if no handler was set for this number of a type.
-  [[nodiscard]] const HandleRun* find(std::uint16_t type) const noexcept {
-    return type < handlers_.size() ? handlers_[type].get() : nullptr;
+  [[nodiscard]] const std::shared_ptr<HandleRun>* find(std::uint16_t type) const noexcept {
+    return type < handlers_.size() && handlers_[type] ? &handlers_[type] : nullptr;
   }
 
  private:

@@ -218,13 +218,16 @@ template <class TryHandle>
 // A single request is received as a message, which is faster.
 [[gnu::always_inline]] inline bool ServerCore::tryHandleRun(Connection& connection) {
   auto& ring = connection.channel->link().incoming();
-  const auto* const handle = runHandlers_.find(ring.nextType());
-  return handle != nullptr && ring.hasSecond() && tryHandleRun(connection, *handle);
+  const auto type = ring.nextType();  // read once: the client may change it
+  const auto* const handle = runHandlers_.find(type);
+  return handle != nullptr && ring.hasSecond() &&
+         tryHandleRun(connection, static_cast<MessageType>(type), *handle);
 }
 
-bool ServerCore::tryHandleRun(Connection& connection, const HandleRun& handle) {
+// `handle` is a copy: the handler may set another one.
+bool ServerCore::tryHandleRun(Connection& connection, MessageType type,
+                              std::shared_ptr<HandleRun> handle) {
   auto& link = connection.channel->link();
-  const auto type = static_cast<MessageType>(link.incoming().nextType());
   if (link.maxMessageBytes() < layout::kFirstSlotBodyBytes) return false;
   RequestRun run(type);
   link.incoming().takeRun(
@@ -237,7 +240,7 @@ bool ServerCore::tryHandleRun(Connection& connection, const HandleRun& handle) {
   progress_.begin(type, cmd);
   const auto generation = connection.generation;
   try {
-    callHandler([&] { handle(run.values()); });
+    callHandler([&] { (*handle)(run.values()); });
   } catch (...) {
     replies_.refuse(connection, generation, run, 0);
     throw;
@@ -246,26 +249,24 @@ bool ServerCore::tryHandleRun(Connection& connection, const HandleRun& handle) {
   return true;
 }
 
-// Returns false, and has closed the connection, if the id of a request is invalid.
+// Returns false, and has closed the connection, if the id of a request is invalid. The service time
+// of a run is that of the first request that says when it was sent.
 bool ServerCore::tryNoteTaken(Connection& connection, const RequestRun& run) noexcept {
   count(endpoint_.control().received, run.size());
-  bool isTimed = false;
-  for (std::size_t index = 0; index < run.size(); ++index) {
+  std::size_t timed = run.size();
+  for (std::size_t index = run.size(); index-- != 0;) {
     if (!connection.tryOwe(run[index].requestId())) {
       closeForProtocolError(connection);
       return false;
     }
-    isTimed = isTimed || run[index].sentTick() != 0;
+    if (run[index].sentTick() != 0) timed = index;
   }
   MPF_STEP(request_taken);
   takeBeforeNs_ = 0;
-  if (!isTimed) {
-    if (progress_.isDue()) progress_.note(Clock::nowNs());
-    return true;
-  }
-  for (std::size_t index = 0; index < run.size(); ++index) {
-    if (const auto tick = run[index].sentTick(); tick != 0)
-      noteTimes(connection, run[index].requestId(), tick);
+  if (timed != run.size()) {
+    noteTimes(connection, run[timed].requestId(), run[timed].sentTick());
+  } else if (progress_.isDue()) {
+    progress_.note(Clock::nowNs());
   }
   return true;
 }

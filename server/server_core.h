@@ -96,7 +96,7 @@ class ServerCore {
   Message receiveUnless(const TryHandle& tryHandle);
   bool hasRequest(Connection& connection) noexcept;
   bool tryHandleRun(Connection& connection);
-  bool tryHandleRun(Connection& connection, const HandleRun& handle);
+  bool tryHandleRun(Connection& connection, MessageType type, std::shared_ptr<HandleRun> handle);
   bool tryNoteTaken(Connection& connection, const RequestRun& run) noexcept;
   bool tryBegin(Connection& connection, Envelope& envelope) noexcept;
   Message finishShort(Connection& connection, const Envelope& envelope) noexcept;

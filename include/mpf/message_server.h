@@ -28,7 +28,6 @@
 #pragma once
 
 #include <array>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -244,7 +243,8 @@ class MessageServer {
       }
     });
   }
-  template <ScalarBody T, std::invocable<std::span<T>> Handler>
+  template <ScalarBody T, class Handler>
+    requires(!std::is_invocable_v<Handler&, T&> && std::is_invocable_v<Handler&, std::span<T>>)
   void on(Handler handler) {
     setRunHandler(
         T::kType, sizeof(T), &fieldsOf<T>,

@@ -197,5 +197,24 @@ TEST_F(ReplyManyValues, OfNoneSendNothing) {
   EXPECT_TRUE((next().route().flags & kEndsRequest) != 0) << "it was still unanswered";
 }
 
+// The values fill the first ring of replies, and go on in the second one.
+TEST_F(ReplyManyValues, LeaveRoomForTheFirstReplies) {
+  startServer();
+  const auto subscriber = heldRequest();
+  std::vector<Message> held;
+  server_->on<Int32>([&](Int32Message&& request) { held.push_back(std::move(request)); });
+  const auto values = readings(100);
+  ASSERT_EQ(client_.sendMany<Int32>(values).count, 100u);
+  while (server_->handleOne()) {
+  }
+  ASSERT_EQ(held.size(), 100u);
+
+  const auto sent = server_->replyMany<Int32>(subscriber, readings(1000));
+
+  EXPECT_EQ(sent.result, ReplyResult::queueFull);
+  for (auto& request : held) ASSERT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+  for (std::size_t i = 0; i < sent.count + 100; ++i) next();
+}
+
 }  // namespace
 }  // namespace mpf::test

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // MessageServer::on() with a handler of several requests.
+#include <cstring>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -262,6 +263,64 @@ TEST_F(RequestRuns, EndWithAnotherHandler) {
   EXPECT_THAT(runs_, testing::IsEmpty());
   expectReply(0);
   expectReply(1);
+}
+
+TEST_F(RequestRuns, MayReplaceTheirHandler) {
+  startServer();
+  const auto calls = std::make_shared<std::vector<std::size_t>>();
+  server_->on<Int32>([this, calls](std::span<Int32> requests) {
+    server_->on<Int32>([](Int32& request) { request.value = 7; });
+    for (auto& request : requests) request.value += 100;
+    calls->push_back(requests.size());
+  });
+  bind();
+  send(0);
+  send(1);
+
+  server_->handleOne();
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  server_->handleOne();
+
+  EXPECT_THAT(*calls, ElementsAre(2));
+  expectReply(0);
+  expectReply(1);
+  EXPECT_EQ(next().tryAs<Int32>()->value, 7);
+}
+
+TEST_F(RequestRuns, AreNotForHandlersThatTakeOneRequestOrSeveral) {
+  startServer();
+  bind();
+  const auto answer = [&] {
+    EXPECT_EQ(client_.send(Int32Message({.value = 1})), SendResult::sent);
+    while (server_->handleOne()) {
+    }
+    return next().tryAs<Int32>()->value;
+  };
+
+  server_->on<Int32>([](auto& request) { request.value += 1; });
+  EXPECT_EQ(answer(), 2);
+  server_->on<Int32>([](auto&& request) { request.value += 2; });
+  EXPECT_EQ(answer(), 3);
+  std::int32_t seen = 0;
+  server_->on<Int32>([&](const auto& request) { seen = request.value; });
+  EXPECT_EQ(answer(), 1);
+  EXPECT_EQ(seen, 1);
+}
+
+// Such a body is a valid Int32 in shared memory, which the client may change.
+TEST_F(RequestRuns, AreCopiesOfALongerBody) {
+  start();
+  std::vector<std::byte> longer(1000);
+  const Int32 fields{.value = 5};
+  std::memcpy(longer.data(), &fields, sizeof fields);
+  ASSERT_EQ(client_.send(Message::copyOf(MessageType::int32, longer)), SendResult::sent);
+
+  server_->handleOne();
+
+  EXPECT_THAT(runs_, ElementsAre(ElementsAre(5)));
+  const auto reply = next();
+  EXPECT_EQ(reply.tryAs<Int32>()->value, 105);
+  EXPECT_EQ(reply.body().size(), 1000u);
 }
 
 TEST_F(RequestRuns, AreNotReceivedTogetherWithoutAHandler) {

@@ -254,9 +254,10 @@ TEST_F(RequestRunTest, LetsTheIdsBeUsedAgain) {
   EXPECT_THAT(repliedIds(), testing::ElementsAre(1, 2, 1, 2, 1, 2));
 }
 
-TEST_F(RequestRunTest, TimesTheRequestsThatSayWhenTheyWereSent) {
+TEST_F(RequestRunTest, TimesTheFirstRequestThatSaysWhenItWasSent) {
   sendRequest(1);
   sendRequest(2, 0, sizeof(Int32), Tick::of(Clock::nowNs()));
+  sendRequest(3, 0, sizeof(Int32), Tick::of(Clock::nowNs()));
 
   EXPECT_TRUE(handleRun());
 
