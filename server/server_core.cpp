@@ -234,6 +234,7 @@ bool ServerCore::tryHandleRun(Connection& connection, MessageType type,
       ValueRun::kMost, [&](const EnvelopeWords& words) { return run.tryAdd(words); },
       [&](const FirstBody& body) { run.add(body); });
   if (run.size() == 0) return false;
+  endpoint_.countTurns(static_cast<std::uint32_t>(run.size() - 1));
   if (!tryNoteTaken(connection, run)) return true;
   std::int32_t cmd = 0;
   std::memcpy(&cmd, run.values().data() + layout::kCmdOffset, sizeof cmd);

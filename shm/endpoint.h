@@ -16,6 +16,7 @@
 //          before a sleep, or, if it has many, every 100 ms.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -79,6 +80,8 @@ class Endpoint {
   }
   // Also settles the windows of new peers.
   Link* nextOther() noexcept;
+  // The caller has taken further messages in the same turn; they count as turns.
+  void countTurns(std::uint32_t more) noexcept { polledLeft_ -= std::min(more, polledLeft_); }
   // Whether there may be an event that is not one of a link: a knock, a rescan or a local event.
   // Cheap: three loads.
   [[nodiscard]] bool hasControlEvents() const noexcept {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // MessageServer::on() with a handler of several requests.
+#include <algorithm>
 #include <cstring>
 #include <span>
 #include <stdexcept>
@@ -231,6 +232,35 @@ TEST_F(RequestRuns, AreNotAnsweredToTheNextClient) {
   for (auto& request : held) EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
   receiveUntil([&] { return answers.size() == 4; });
   EXPECT_THAT(answers, ElementsAre(0, 0, 0, 0)) << "100 is the answer to a request of the first";
+}
+
+TEST_F(RequestRuns, OfABusyClientDoNotDelayAnotherForLong) {
+  start();
+  MessageClient quiet(dispatcher_, [](const Message&) {});
+  quiet.bind("device[0]/a");
+  runUntil([&] { return quiet.isConnected(); });
+  const std::vector<Int32> many(60);
+  // Handles one run; the busy client has always sent more.
+  const auto handleRun = [&] {
+    static_cast<void>(client_.sendMany<Int32>(many));
+    runs_.clear();
+    server_->handleOne();
+    dispatcher_.runOnce(Deadline::atNs(0));
+    messages_.clear();
+  };
+  const std::vector<std::int32_t> ofQuiet{-1};
+  std::size_t most = 0;
+  for (int round = 0; round < 16; ++round) {
+    for (int i = 0; i < 5000 + round; ++i) handleRun();  // then the quiet client is not polled
+    ASSERT_EQ(quiet.send(Int32Message({.value = -1})), SendResult::sent);
+    std::size_t before = 0;
+    for (handleRun(); runs_.at(0) != ofQuiet; handleRun()) before += runs_.at(0).size();
+    most = std::max(most, before);
+  }
+
+  EXPECT_LE(most, 64u);
+  runUntil([&] { return !server_->handleOne(); });
+  messages_.clear();
 }
 
 TEST_F(RequestRuns, HaveTheTimeOfTheirSendingIfTheServerStampsReplies) {
