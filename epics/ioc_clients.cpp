@@ -66,7 +66,7 @@ std::shared_ptr<SharedClient> IocClients::connectionTo(const std::string& server
 }
 
 void IocClients::add(std::unique_ptr<DevMpf> owner, Device& device) {
-  initHookRegister(onInitHook);  // also for a device with an invalid link, which has no connection
+  initHookRegister(onInitHook);  // also for a refused device, which has no connection
   const std::lock_guard lock(mutex_);
   devices_.emplace_back(std::move(owner), &device);
 }

@@ -147,6 +147,18 @@ TEST_F(GpibRecordTest, ARecordOfALinkWithoutServerIsRefused) {
   EXPECT_EQ(Ioc::get("v.PACT"), "1");
 }
 
+// AddressSanitizer sees it if the end of the next IOC uses the record.
+TEST_F(GpibRecordTest, ARefusedRecordLeavesNothingToTheNextIoc) {
+  {
+    const Ioc refused(input("ai", "#L77 A3 @?V"));
+  }
+  FakeSerial server(backplane_, "-8.874270409E-01\r\n");
+
+  const Ioc next(input("ai", "#L10 A22 @?V\\\\n"));
+
+  Ioc::waitFor("v.UDF", "0");
+}
+
 TEST_F(GpibRecordTest, AnInvalidFormatIsRefused) {
   {
     const Ioc ioc(output("ao", "#L10 A9 @VOLT %s", "1.5"));

@@ -50,19 +50,6 @@ TEST_F(GeneralDeviceTest, AnInvalidLinkDisablesTheRecord) {
   }
 }
 
-TEST_F(GeneralDeviceTest, ARecordWithAnInvalidLinkLeavesNothingToTheNextIoc) {
-  {
-    const Ioc ioc(longin("@"));
-  }
-  const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
-    static_cast<void>(self.reply(std::move(request)));
-  });
-
-  const Ioc next(longin("@s value=2"));
-
-  Ioc::waitFor("v", "2");
-}
-
 TEST_F(GeneralDeviceTest, AStatusOtherThanZeroIsAReadAlarmAndKeepsTheValue) {
   const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
     request.tryAs<Int32>()->status = -3;
