@@ -57,7 +57,7 @@ RepliedMany MessageServer::replyBodies(const Message& request, MessageType type,
 }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
-  return ReplySender::allocate(request.route(), bytes);
+  return core_->replies().allocate(request.route(), bytes);
 }
 BodyBytes MessageServer::allocateShared(std::size_t bytes) {
   return core_->publisher().allocate(bytes);
@@ -69,15 +69,14 @@ std::size_t MessageServer::publish(const Message& message, std::span<const Messa
 int MessageServer::descriptor() { return core_->descriptor(); }
 
 void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> handler) {
-  core_->setRunHandler(type, {});
-  handlers_.at(static_cast<std::size_t>(type)) = std::move(handler);
+  core_->handlers().set(type, std::move(handler));
 }
 
 void MessageServer::setRunHandler(MessageType type, std::size_t size,
                                   std::span<std::byte> (*fields)(Message&),
                                   std::function<void(std::span<std::byte>)> handler) {
   const auto handle = std::make_shared<HandleRun>(std::move(handler));
-  setHandler(type, [this, fields, handle](Message&& request) {
+  auto ofMessage = [this, fields, handle](Message&& request) {
     const auto original = fields(request);
     if (original.empty()) return refuse(std::move(request));
     // A copy, as in a run: a body in shared memory may change.
@@ -87,8 +86,10 @@ void MessageServer::setRunHandler(MessageType type, std::size_t size,
     (*handle)(value);
     std::ranges::copy(value, original.begin());
     static_cast<void>(reply(std::move(request)));
-  });
-  if (size == layout::kFirstSlotBodyBytes) core_->setRunHandler(type, handle);
+  };
+  HandleRun ofRun;
+  if (size == layout::kFirstSlotBodyBytes) ofRun = [handle](auto values) { (*handle)(values); };
+  core_->handlers().set(type, std::move(ofMessage), std::move(ofRun));
 }
 
 bool MessageServer::handleOne() {
@@ -100,10 +101,10 @@ bool MessageServer::handleOne() {
 }
 
 void MessageServer::handle(Message&& request) {
-  const auto type = static_cast<std::size_t>(request.getType());
-  if (type >= handlers_.size() || !handlers_[type]) return refuse(std::move(request));
+  const auto* const handler = core_->handlers().find(static_cast<std::uint16_t>(request.getType()));
+  if (handler == nullptr) return refuse(std::move(request));
   // If it throws, the request is destroyed without a reply, which refuses it.
-  core_->callHandler([&] { handlers_[type](std::move(request)); });
+  core_->callHandler([&] { (*handler)(std::move(request)); });
 }
 
 void MessageServer::run() {

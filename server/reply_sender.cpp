@@ -257,13 +257,14 @@ void ReplySender::refuseAbandoned(const Route& route) noexcept {
 }
 
 BodyBytes ReplySender::tryAllocateInPool(const Route& route, std::size_t bytes) noexcept {
+  if (route.link == 0 || forkGuard_.isInherited()) return {};
   auto& connection = Connection::of(route);
   const BiasedLock::Guard lock(*connection.lock);
   return connection.isOpenFor(route) ? connection.channel->tryAllocateLocked(bytes) : BodyBytes{};
 }
 
 BodyBytes ReplySender::allocate(const Route& route, std::size_t bytes) {
-  auto body = route.link != 0 ? tryAllocateInPool(route, bytes) : BodyBytes{};
+  auto body = tryAllocateInPool(route, bytes);
   if (body.data == nullptr) body = allocateHeapBody(bytes);
   return body;
 }

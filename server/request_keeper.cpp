@@ -1,40 +1,31 @@
 // SPDX-License-Identifier: MIT
 #include "server/request_keeper.h"
 
-#include <list>
-#include <mutex>
+#include <atomic>
 
 #include "server/reply_sender.h"
 
 namespace mpf {
-namespace {
 
-std::mutex& mutex() {
-  static auto* const theMutex = new std::mutex;
-  return *theMutex;
-}
-
-std::list<RequestKeeper>& all() {
-  static auto* const keepers = new std::list<RequestKeeper>;
-  return *keepers;
-}
-
-}  // namespace
-
+// No lock: another thread might hold it when this process forks.
 RequestKeeper& RequestKeeper::make(ReplySender& replies) {
-  const std::lock_guard lock(mutex());
-  auto& keeper = all().emplace_back();
-  keeper.replies_ = &replies;
-  return keeper;
+  static std::atomic<RequestKeeper*> newest{nullptr};
+  auto* const keeper = new RequestKeeper(replies);
+  keeper->older_ = newest.load(std::memory_order_relaxed);
+  while (!newest.compare_exchange_weak(keeper->older_, keeper, std::memory_order_relaxed)) {
+  }
+  return *keeper;
 }
 
 void RequestKeeper::leave() noexcept {
-  const std::lock_guard lock(mutex());
+  if (forkGuard_.isInherited()) return;
+  const std::lock_guard lock(mutex_);
   replies_ = nullptr;
 }
 
 void RequestKeeper::abandoned(const Route& route) noexcept {
-  const std::lock_guard lock(mutex());
+  if (forkGuard_.isInherited()) return;
+  const std::lock_guard lock(mutex_);
   if (replies_ != nullptr) replies_->refuseAbandoned(route);
 }
 

@@ -2,12 +2,16 @@
 // RequestKeeper: refuses the requests of a server whose handles are destroyed without a reply.
 //
 // Handles of requests may outlive their server, so keepers are never freed: they cost a few bytes
-// for each server that the process creates.
+// for each server that the process creates. In the child of a fork, those of the parent do nothing.
 //
 // Threads  any.
 #pragma once
 
+#include <mutex>
+
 #include <mpf/message.h>
+
+#include "shm/fork_guard.h"
 
 namespace mpf {
 
@@ -22,7 +26,12 @@ class RequestKeeper final : public RouteKeeper {
   void abandoned(const Route& route) noexcept override;
 
  private:
-  ReplySender* replies_ = nullptr;
+  explicit RequestKeeper(ReplySender& replies) noexcept : replies_(&replies) {}
+
+  ForkGuard forkGuard_;
+  std::mutex mutex_;
+  ReplySender* replies_;  // nullptr after leave()
+  RequestKeeper* older_ = nullptr;  // the list of all, so that none counts as a leak
 };
 
 }  // namespace mpf

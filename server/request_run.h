@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: MIT
-// RequestRun: waiting requests of one client that a handler gets together. RunHandlers: the
-// handlers of such requests, by message type.
+// RequestRun: waiting requests of one client that a handler gets together.
 //
-// Threads  the server's thread.
+// Threads  plain data.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <span>
-#include <tuple>
-#include <utility>
 
 #include <mpf/message_types.h>
 
@@ -20,9 +15,6 @@
 #include "shm/messages/value_run.h"
 
 namespace mpf {
-
-// Changes the values, which are then sent as the replies; they lie one after the other.
-using HandleRun = std::function<void(std::span<std::byte> values)>;
 
 class RequestRun {
  public:
@@ -53,21 +45,6 @@ class RequestRun {
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): only the first `count_` have a value
   std::array<EnvelopeWords, ValueRun::kMost> words_;
   ValueRun values_;
-};
-
-class RunHandlers {
- public:
-  // Null removes the handler of a type.
-  void set(MessageType type, std::shared_ptr<HandleRun> handler) {
-    handlers_.at(static_cast<std::size_t>(type)) = std::move(handler);
-  }
-  // nullptr if no handler was set for this number of a type.
-  [[nodiscard]] const std::shared_ptr<HandleRun>* find(std::uint16_t type) const noexcept {
-    return type < handlers_.size() && handlers_[type] ? &handlers_[type] : nullptr;
-  }
-
- private:
-  std::array<std::shared_ptr<HandleRun>, std::tuple_size_v<MessageTypes> + 1> handlers_;
 };
 
 }  // namespace mpf

@@ -57,6 +57,7 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
       progress_(endpoint_.control()) {}
 
 ServerCore::~ServerCore() {
+  handlers_.clear();  // refuses the requests that they keep
   keeper_.leave();
   if (endpoint_.forkGuard().isInherited()) return;
   MPF_STEP(server_leaving);
@@ -219,14 +220,12 @@ template <class TryHandle>
 [[gnu::always_inline]] inline bool ServerCore::tryHandleRun(Connection& connection) {
   auto& ring = connection.channel->link().incoming();
   const auto type = ring.nextType();  // read once: the client may change it
-  const auto* const handle = runHandlers_.find(type);
+  const auto* const handle = handlers_.findOfRun(type);
   return handle != nullptr && ring.hasSecond() &&
          tryHandleRun(connection, static_cast<MessageType>(type), *handle);
 }
 
-// `handle` is a copy: the handler may set another one.
-bool ServerCore::tryHandleRun(Connection& connection, MessageType type,
-                              std::shared_ptr<HandleRun> handle) {
+bool ServerCore::tryHandleRun(Connection& connection, MessageType type, const HandleRun& handle) {
   auto& link = connection.channel->link();
   if (link.maxMessageBytes() < layout::kFirstSlotBodyBytes) return false;
   RequestRun run(type);
@@ -241,7 +240,7 @@ bool ServerCore::tryHandleRun(Connection& connection, MessageType type,
   progress_.begin(type, cmd);
   const auto generation = connection.generation;
   try {
-    callHandler([&] { (*handle)(run.values()); });
+    callHandler([&] { handle(run.values()); });
   } catch (...) {
     replies_.refuse(connection, generation, run, 0);
     throw;

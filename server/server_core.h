@@ -22,6 +22,7 @@
 
 #include "server/acceptor.h"
 #include "server/connections.h"
+#include "server/handlers.h"
 #include "server/progress.h"
 #include "server/publisher.h"
 #include "server/reply_counts.h"
@@ -45,13 +46,10 @@ class ServerCore {
   [[nodiscard]] Connections& connections() noexcept { return connections_; }
   [[nodiscard]] ReplySender& replies() noexcept { return replies_; }
   [[nodiscard]] Publisher& publisher() noexcept { return publisher_; }
+  [[nodiscard]] Handlers& handlers() noexcept { return handlers_; }
 
   bool wait(Deadline deadline);
   Message receive();
-  // Null removes the handler.
-  void setRunHandler(MessageType type, std::shared_ptr<HandleRun> handler) {
-    runHandlers_.set(type, std::move(handler));
-  }
   // As receive(). If there is a handler for several requests that wait, calls it, sends the
   // replies, and returns an empty handle.
   //   throws  what the handler throws, and as receive()
@@ -59,6 +57,7 @@ class ServerCore {
   // Calls a handler. The other requests wait if it throws.
   template <class Handle>
   void callHandler(const Handle& handle) try {
+    const Handlers::Call call(handlers_);
     handle();
   } catch (...) {
     endHandling();
@@ -96,7 +95,7 @@ class ServerCore {
   Message receiveUnless(const TryHandle& tryHandle);
   bool hasRequest(Connection& connection) noexcept;
   bool tryHandleRun(Connection& connection);
-  bool tryHandleRun(Connection& connection, MessageType type, std::shared_ptr<HandleRun> handle);
+  bool tryHandleRun(Connection& connection, MessageType type, const HandleRun& handle);
   bool tryNoteTaken(Connection& connection, const RequestRun& run) noexcept;
   bool tryBegin(Connection& connection, Envelope& envelope) noexcept;
   Message finishShort(Connection& connection, const Envelope& envelope) noexcept;
@@ -122,7 +121,7 @@ class ServerCore {
   Publisher publisher_;
   RequestKeeper& keeper_;
   Progress progress_;
-  RunHandlers runHandlers_;
+  Handlers handlers_;
   std::int64_t takeBeforeNs_ = 0;  // of the request received last; 0: never
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;

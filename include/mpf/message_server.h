@@ -27,14 +27,12 @@
 //          Dispatcher.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
 #include <string>
-#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -210,8 +208,8 @@ class MessageServer {
     return result;
   }
 
-  // Sets the handler that run() and handleOne() call for requests of type T. What it gets depends
-  // on its parameter:
+  // Sets the handler that run() and handleOne() call for requests of type T. A handler may set
+  // another in its own place. What it gets depends on its parameter:
   //
   //   T&               the fields of one request, which is then sent as the reply
   //   MessageOf<T>&    one request, with its elements and marks, which is then sent as the reply
@@ -308,8 +306,6 @@ class MessageServer {
     reply.setClientExtra(request.getClientExtra());
   }
   std::unique_ptr<class ServerCore> core_;
-  // By the number of a type.
-  std::array<std::function<void(Message&&)>, std::tuple_size_v<MessageTypes> + 1> handlers_;
 };
 
 }  // namespace mpf

@@ -136,6 +136,46 @@ TEST_F(RequestRuns, MayReplaceTheirHandler) {
   EXPECT_EQ(next().tryAs<Int32>()->value, 7);
 }
 
+// A handler of single requests, and one of several for which only one request waits.
+TEST_F(RequestRuns, OfOneMayReplaceTheirHandler) {
+  startServer();
+  bind();
+  const auto owned = std::make_shared<int>();
+  std::vector<long> owners;
+  const auto replace = [&] {
+    server_->on<Int32>([](Int32& request) { request.value = 7; });
+    owners.push_back(owned.use_count());
+  };
+  const auto answer = [&] {
+    send(0);
+    server_->handleOne();
+    const auto reply = next();
+    return reply.tryAs<Int32>()->value;
+  };
+
+  server_->on<Int32>([&, owned](Int32&) { replace(); });
+  EXPECT_EQ(answer(), 0);
+  EXPECT_EQ(answer(), 7);
+  server_->on<Int32>([&, owned](std::span<Int32>) { replace(); });
+  EXPECT_EQ(answer(), 0);
+  EXPECT_EQ(answer(), 7);
+
+  EXPECT_THAT(owners, ElementsAre(2, 2)) << "a handler was destroyed while it was running";
+}
+
+// The requests that a handler keeps end before their server.
+TEST_F(RequestRuns, ThatAHandlerKeepsAreRefusedWhenTheServerEnds) {
+  startServer().on<Int32>([kept = std::make_shared<std::vector<Message>>()](
+                              Int32Message&& request) { kept->push_back(std::move(request)); });
+  bind();
+  send(0);
+  server_->handleOne();
+
+  server_.reset();
+
+  EXPECT_EQ(fateOf(next()), Fate::refused);
+}
+
 TEST_F(RequestRuns, AreNotForHandlersThatTakeOneRequestOrSeveral) {
   startServer();
   bind();

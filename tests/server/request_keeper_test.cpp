@@ -2,8 +2,12 @@
 // RequestKeeper: refuses requests whose handles are destroyed, until its server ends.
 #include "server/request_keeper.h"
 
+#include <signal.h>
+#include <sys/prctl.h>
+
 #include <gtest/gtest.h>
 
+#include "tests/base/child_process.h"
 #include "tests/server/server_parts_fixture.h"
 
 namespace mpf::test {
@@ -50,6 +54,23 @@ TEST_F(RequestKeeperTest, DoesNothingAfterItsServerHasEnded) {
     keeper_.leave();
   }
 
+  EXPECT_FALSE(link_.incoming().hasMessage());
+}
+
+TEST_F(RequestKeeperTest, WaitsForNoLockInTheChildOfAFork) {
+  auto inherited = request(3);
+  {
+    const BiasedLock::Guard lock(*connection_.lock);  // never released in the child
+    const auto status = endOf([&] {
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      const auto body = replies_.allocate(inherited.route(), 10'000);
+      EXPECT_EQ(body.lender, &heapLender());
+      body.lender->takeBack(body.data, body.capacity);
+      inherited.reset();
+      return HasFailure() ? 1 : 0;
+    });
+    EXPECT_EQ(status, 0);
+  }
   EXPECT_FALSE(link_.incoming().hasMessage());
 }
 

@@ -162,12 +162,11 @@ TEST_F(ServerCoreTest, AQueueSizeOutsideTheLimitsIsAnError) {
 class RequestRunTest : public ServerCoreTest {
  protected:
   RequestRunTest() {
-    server_->setRunHandler(
-        MessageType::int32, std::make_shared<HandleRun>([this](std::span<std::byte> values) {
-          sizes_.push_back(values.size() / sizeof(Int32));
-          const auto handling = Handling::of(control().handling.load());
-          EXPECT_TRUE(handling && handling->type == static_cast<std::uint16_t>(MessageType::int32));
-        }));
+    server_->handlers().set(MessageType::int32, {}, [this](std::span<std::byte> values) {
+      sizes_.push_back(values.size() / sizeof(Int32));
+      const auto handling = Handling::of(control().handling.load());
+      EXPECT_TRUE(handling && handling->type == static_cast<std::uint16_t>(MessageType::int32));
+    });
   }
   [[nodiscard]] const layout::WindowControl& control() const { return link_->peer()->control(); }
   // Handles the next requests; false if they were received as a message, or none waits.
@@ -279,9 +278,8 @@ TEST_F(RequestRunTest, DoesNotContainABodyOfAnotherSize) {
 }
 
 TEST_F(RequestRunTest, KeepsTheRequestsAfterAHandlerThatThrows) {
-  server_->setRunHandler(MessageType::int32, std::make_shared<HandleRun>([](auto) {
-                           throw std::runtime_error("the handler throws");
-                         }));
+  server_->handlers().set(MessageType::int32, {},
+                          [](auto) { throw std::runtime_error("the handler throws"); });
   pollfd descriptor{server_->descriptor(), POLLIN, 0};
   ASSERT_FALSE(server_->receive());
   sendRequest(1);
