@@ -155,7 +155,7 @@ class RingProducer {
  private:
   // Lines to claim at once, until the next look at the consumer. In a stream, many: its consumer
   // keeps a distance. Otherwise few: the consumer may be about to read a slot that waits for the
-  // transfers of these lines. None when messages go there and back one by one: the consumer polls
+  // transfers of these lines. None for round trips one by one: the consumer polls
   // the next slot and takes its line back at once. There, expectPush() requests the next line.
   static constexpr std::uint64_t kFewClaimed = 8, kManyClaimed = 32;
   static constexpr std::uint64_t kLookEvery = 16;  // slots, if no lines are claimed

@@ -64,7 +64,7 @@ inline constexpr const char* kLoopback = "One host, loopback";
 inline constexpr const char* kNamespaces = "Two network namespaces, veth";
 // The rest of the headings, which the goals also use.
 inline constexpr const char* kMessages = ": round trips of an Int32";
-inline constexpr const char* kArrays = ": arrays of 1 MiB there and back";
+inline constexpr const char* kArrays = ": round trips of arrays of 1 MiB";
 inline constexpr const char* kClients = ": many clients through one pair of routers";
 inline constexpr const char* kIdle = ": an idle pair of routers with one client";
 
