@@ -38,7 +38,7 @@ void addCrate(CLI::App& app, Run& run) {
            {"convert", "Writes the crate file that a startup file of the original MPF amounts to"},
            {"ps", "Lists the processes of crates, with their states and restarts"},
            {"logs", "Shows what a process of a crate has printed"},
-           {"capsule", "Shows the last words of a process that died"},
+           {"capsule", "Shows the crash report of a process"},
            {"stop", "Stops a process of a crate, or the whole crate"},
            {"start", "Starts a process of a crate that was stopped or has failed"},
            {"restart", "Restarts a process of a crate"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Capsule: the last words of a process that died, as one JSON document in one file.
+// Capsule: the crash report of a process, as one JSON document in one file.
 //
 //   SegmentWitness ─┐
 //   Death ──────────┼─► capsuleOf() ─► CapsuleStore::add() ─► file ─► readCapsule() ─► mpf capsule

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf capsule: shows the last words of a process that died, or lists those of a folder.
+// mpf capsule: shows the crash report of a process, or lists those of a folder.
 #include "crate/capsule/capsule.h"
 
 #include <CLI/CLI.hpp>
@@ -54,7 +54,7 @@ int listCapsules(const CapsuleArguments& arguments) {
 
 void addCapsule(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "capsule", "Shows the last words of a process that died; without a file, lists them");
+      "capsule", "Shows the crash report of a process; without a file, lists them");
   auto arguments = std::make_shared<CapsuleArguments>();
   auto* const file = command.add_option("file", arguments->file, "A capsule");
   command.add_option("--folder", arguments->folder, "List the capsules of this folder")

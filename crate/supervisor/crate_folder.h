@@ -6,7 +6,7 @@
 //   state.json     the processes that were started
 //   NAME.log       stdout and stderr of a process
 //   wires          connects the device models of several processes
-//   capsules/      last words of processes that died
+//   capsules/      crash reports of processes
 //
 // The folder is $MPF_CRATES/NAME if that variable is set; for root /var/lib/mpf/crates/NAME;
 // otherwise $XDG_STATE_HOME/mpf/crates/NAME, where the default is ~/.local/state.

@@ -35,7 +35,7 @@ Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
       load_(std::move(load)),
       crate_(load_()),
       logs_(::isatty(STDERR_FILENO) != 0, crate_.maxLogBytes),
-      lastWords_(folder_, crate_) {
+      capsuleWriter_(folder_, crate_) {
   folder_.create();
   lock_ = folder_.lock();
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // reaps what the processes leave behind
@@ -75,7 +75,7 @@ void Supervisor::takeOver() {
     member->isNotified = true;
     service.adopted(recorded.pid, recorded.startTicks, recorded.restarts, Clock::nowNs(),
                     startNsOf(recorded.startTicks));
-    lastWords_.watch(service);
+    capsuleWriter_.watch(service);
     log(service, fmt::format("taken over, pid {}", recorded.pid));
     if (member->isRemoved) service.requestStop(Clock::nowNs());
     else if (recorded.command != shellText(service.plan())) service.requestRestart(Clock::nowNs());
@@ -182,7 +182,7 @@ void Supervisor::start(Member& member) {
     member.isNotified = false;
     member.adopted.reset();
     service.started(child.pid(), child.startTicks(), Clock::nowNs());
-    lastWords_.watch(service);
+    capsuleWriter_.watch(service);
     nextLookNs_ = 0;
     record();
     if (const auto why = child.open(); !why.empty())
@@ -239,8 +239,8 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   const auto pid = service.pid();
   const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
   member.adopted.reset();
-  lastWords_.look();
-  const auto capsule = lastWords_.collect(service, end);
+  capsuleWriter_.look();
+  const auto capsule = capsuleWriter_.collect(service, end);
   service.ended(end, Clock::nowNs());
   record();
   for (const auto& [backplane, watch] : watches_) watch.removeFilesOfDead();
@@ -257,7 +257,7 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
 // Finds out which processes are ready, and which are stalled.
 void Supervisor::look() {
   for (auto& [backplane, watch] : watches_) watch.look();
-  lastWords_.look();
+  capsuleWriter_.look();
   const auto now = Clock::nowNs();
   for (const auto& member : members_) {
     auto& service = member->service;
@@ -362,7 +362,7 @@ void Supervisor::wait() {
     polled.push_back({member->adopted.get(), POLLIN, 0});
   }
   const auto firstWitness = static_cast<std::ptrdiff_t>(polled.size());
-  lastWords_.addTo(polled);
+  capsuleWriter_.addTo(polled);
   const auto firstControl = static_cast<std::ptrdiff_t>(polled.size());
   control_.addTo(polled);
   ::poll(polled.data(), polled.size(), waitMs());
@@ -375,7 +375,7 @@ void Supervisor::wait() {
   if (polled[2].revents != 0) takeReports();
   if (std::any_of(polled.begin() + firstWitness, polled.begin() + firstControl,
                   [](const pollfd& one) { return one.revents != 0; }))
-    lastWords_.look();
+    capsuleWriter_.look();
   if (Clock::nowNs() >= nextLookNs_) look();
 }
 

@@ -20,9 +20,9 @@
 #include <string>
 #include <vector>
 
+#include "crate/supervisor/capsule_writer.h"
 #include "crate/supervisor/control_server.h"
 #include "crate/supervisor/crate_state.h"
-#include "crate/supervisor/last_words.h"
 #include "crate/supervisor/log_follower.h"
 #include "crate/supervisor/notify_socket.h"
 #include "crate/supervisor/server_watch.h"
@@ -86,7 +86,7 @@ class Supervisor {
   std::vector<std::unique_ptr<Member>> members_;  // each after those that it needs
   std::map<std::string, ServerWatch> watches_;  // by backplane
   LogFollower logs_;
-  LastWords lastWords_;
+  CapsuleWriter capsuleWriter_;
   NotifySocket notify_;
   ControlServer control_{[this](const auto& request) { return answer(request); }};
   std::int64_t nextLookNs_ = 0;

@@ -3,7 +3,7 @@
 // backplanes call its servers. Each call has a reply, which is that of its request, or a stated
 // fate; no process runs twice, and nothing is left.
 //
-//   MPF_TEST_BLOWS=20000 MPF_TEST_SEED=7 supervisor_test --gtest_filter='CrateTorture*'
+//   MPF_TEST_FAULTS=20000 MPF_TEST_SEED=7 supervisor_test --gtest_filter='CrateTorture*'
 #include <dirent.h>
 
 #include <atomic>
@@ -137,7 +137,7 @@ PVXS_QSRV_ENABLE = "NO"
   void strike(std::mt19937& random) {
     const auto victim = random() % names_.size();
     if (victim == 0) {
-      ++blows_["supervisor killed"];
+      ++faults_["supervisor killed"];
       killSupervisor();
       return run();
     }
@@ -145,15 +145,15 @@ PVXS_QSRV_ENABLE = "NO"
     if (pid == 0) return;  // between its end and its restart
     switch (random() % 3) {
       case 0:
-        ++blows_["killed"];
+        ++faults_["killed"];
         ::kill(pid, SIGKILL);
         break;
       case 1:
-        ++blows_["ended"];
+        ++faults_["ended"];
         ::kill(pid, SIGTERM);
         break;
       default:
-        ++blows_["paused"];
+        ++faults_["paused"];
         ::kill(pid, SIGSTOP);
         std::this_thread::yield();
         ::kill(pid, SIGCONT);
@@ -180,7 +180,7 @@ PVXS_QSRV_ENABLE = "NO"
   std::vector<std::string> names_{"supervisor", "one", "two", "three", "dac", "near", "far"};
   const mpf::test::TestBackplane far_;
   const mpf::test::FreePort port_;
-  std::map<std::string, int> blows_;
+  std::map<std::string, int> faults_;
 };
 
 TEST_F(CrateTorture, LosesNothingAndLeavesNothing) {
@@ -195,7 +195,7 @@ TEST_F(CrateTorture, LosesNothingAndLeavesNothing) {
       callers.push_back(std::make_unique<Caller>(backplane_, server, 0));
       callers.push_back(std::make_unique<Caller>(far_, server, 1));
     }
-    for (unsigned blow = 0; blow < settingOf("MPF_TEST_BLOWS", 60); ++blow) {
+    for (unsigned fault = 0; fault < settingOf("MPF_TEST_FAULTS", 60); ++fault) {
       watchdog_.emplace("CrateTorture");
       strike(random);
       expectNoDoubles();
@@ -213,7 +213,7 @@ TEST_F(CrateTorture, LosesNothingAndLeavesNothing) {
   EXPECT_EQ(WEXITSTATUS(stop()), 0);
   EXPECT_EQ(processesOn(backplane_.name()).size() + processesOn(far_.name()).size(), 0U);
   EXPECT_EQ(backplane_.segmentNames().size() + far_.segmentNames().size(), 0U);
-  for (const auto& [what, count] : blows_) std::cout << what << ": " << count << "\n";
+  for (const auto& [what, count] : faults_) std::cout << what << ": " << count << "\n";
 }
 
 }  // namespace

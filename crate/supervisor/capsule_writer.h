@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// LastWords: writes a capsule when a process of the crate dies, is stalled, or is restarted.
+// CapsuleWriter: writes a capsule when a process of the crate dies, is stalled, or is restarted.
 //
 //   watch(), look() ─► SegmentWitness        the process dies ─► collect() ─► CapsuleStore
 //
@@ -19,9 +19,9 @@
 
 namespace mpf::crate {
 
-class LastWords {
+class CapsuleWriter {
  public:
-  LastWords(const CrateFolder& folder, const Crate& crate)
+  CapsuleWriter(const CrateFolder& folder, const Crate& crate)
       : folder_(folder),
         crate_(crate.name),
         store_(folder.file("capsules"), static_cast<std::size_t>(crate.maxCapsules),

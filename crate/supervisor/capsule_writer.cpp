@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "crate/supervisor/last_words.h"
+#include "crate/supervisor/capsule_writer.h"
 
 #include <exception>
 #include <filesystem>
@@ -19,23 +19,23 @@ Cause causeOf(const Service& service, const ProcessEnd& end) {
 
 }  // namespace
 
-void LastWords::addTo(std::vector<pollfd>& polled) const {
+void CapsuleWriter::addTo(std::vector<pollfd>& polled) const {
   for (const auto& [backplane, witness] : witnesses_)
     polled.push_back({witness.descriptor(), POLLIN, 0});
 }
 
-void LastWords::look() {
+void CapsuleWriter::look() {
   for (auto& [backplane, witness] : witnesses_) witness.look();
 }
 
-void LastWords::watch(const Service& service) {
+void CapsuleWriter::watch(const Service& service) {
   const auto& backplane = service.plan().backplane;
   if (backplane.empty()) return;  // a process that is no longer in the crate
   auto& witness = witnesses_.try_emplace(backplane, backplane).first->second;
   witness.watch(service.pid(), service.startTicks());
 }
 
-std::string LastWords::collect(const Service& service, const ProcessEnd& end) try {
+std::string CapsuleWriter::collect(const Service& service, const ProcessEnd& end) try {
   const auto& plan = service.plan();
   const auto found = witnesses_.find(plan.backplane);
   if (found == witnesses_.end()) return {};
