@@ -19,7 +19,7 @@ std::string goals(const std::vector<Result>& results) {
   if (const auto* row = goals.find("One way", kMpf, Mode::spin))
     goals.atLeast("Int32 one way, million a second, at least", row->figures.perSecond / 1e6, 60);
   if (const auto* row = goals.find("One way", mpfBatchPeer(true).name, Mode::spin))
-    goals.atLeast("Int32 one way, values taken in runs, million a second, at least",
+    goals.atLeast("Int32 one way, values taken in batches, million a second, at least",
                   row->figures.perSecond / 1e6, 60);
   if (const auto* row = goals.find("One way", kMpf, Mode::adaptive))
     goals.atLeast("Int32 one way, adaptive, million a second, at least",
@@ -28,7 +28,7 @@ std::string goals(const std::vector<Result>& results) {
     goals.atLeast("100 outstanding, polling, million a second, at least",
                   row->figures.perSecond / 1e6, 20);
   if (const auto* row = goals.find("4 B with 100 outstanding", mpfRunPeer().name, Mode::spin))
-    goals.atLeast("100 outstanding in runs, polling, million a second, at least",
+    goals.atLeast("100 outstanding in batches, polling, million a second, at least",
                   row->figures.perSecond / 1e6, 20);
   goals.atMost(
       "1 MiB untouched, polling, x Int32 round trip, at most",

@@ -254,7 +254,8 @@ PeerFamily mpfPeer() {
 
 PeerFamily mpfBatchPeer(bool inRuns) {
   auto family = mpfPeer();
-  family.name = std::string(kMpf) + (inRuns ? ", 64 at a time, taken in runs" : ", 64 at a time");
+  family.name =
+      std::string(kMpf) + (inRuns ? ", 64 at a time, taken in batches" : ", 64 at a time");
   family.make = [inRuns](const PeerOptions& options) {
     return makeMpfPeer<Char8Array>(options, {.serverBackplane = options.name,
                                              .clientBackplane = options.name,
@@ -266,7 +267,7 @@ PeerFamily mpfBatchPeer(bool inRuns) {
 
 PeerFamily mpfRunPeer() {
   auto family = mpfPeer();
-  family.name = std::string(kMpf) + ", in runs";
+  family.name = std::string(kMpf) + ", in batches";
   family.make = [](const PeerOptions& options) {
     return makeMpfPeer<Char8Array>(
         options,

@@ -51,7 +51,7 @@ TEST_F(SupervisorTest, RestartsAProcessThatDies) {
   EXPECT_TRUE(isReplying("Int32"));
 }
 
-TEST_F(SupervisorTest, KeepsTheCapsuleWriterOfAProcessThatDies) {
+TEST_F(SupervisorTest, KeepsACapsuleOfAProcessThatDies) {
   run(kServer);
   waitForState("int32", "ready");
   ASSERT_TRUE(isReplying("Int32"));
