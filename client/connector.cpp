@@ -3,6 +3,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <ctime>
@@ -168,7 +169,8 @@ std::string Connector::notAcceptedBecause(const PeerWindow& server) const {
   const auto handling = Handling::of(control.handling.load(std::memory_order_relaxed));
   const auto sinceNs =
       static_cast<std::int64_t>(control.progressAtNs.load(std::memory_order_relaxed));
-  const auto busyNs = Clock::nowNs() - sinceNs;
+  const auto nowNs = Clock::nowNs();
+  const auto busyNs = nowNs - std::clamp<std::int64_t>(sinceNs, 0, nowNs);  // the server's claim
   if (!handling || busyNs < kBusyNs)
     return fmt::format("server \"{}\" has not accepted the client yet", server_);
   return fmt::format(

@@ -160,6 +160,7 @@ void Dispatcher::Impl::interrupt() noexcept {
 }
 
 int Dispatcher::Impl::descriptor() {
+  const auto guard = becomeRunner();
   hasDescriptor_ = true;
   static_cast<void>(endpoint().arm());
   return endpoint().descriptor();
@@ -167,6 +168,7 @@ int Dispatcher::Impl::descriptor() {
 
 bool Dispatcher::Impl::runPending(int most) {
   const auto guard = becomeRunner();
+  parts_.timer.setWaitingThread();
   // Peers may send messages and hints without end: the event loop must have its turn.
   for (int batches = 0; batches < most; ++batches) {
     if (step()) continue;

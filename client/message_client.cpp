@@ -84,7 +84,9 @@ SentMany MessageClient::sendBodies(MessageType type, std::size_t size,
   return binding_->sendBodies({type, size, bodies}, takeBefore, requestIds);
 }
 
-BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
+BodyBytes MessageClient::allocate(std::size_t bytes) {
+  return isInherited() ? allocateHeapBody(bytes) : binding_->allocate(bytes);
+}
 
 void MessageClient::cancel(std::uint32_t requestId) {
   if (isInherited()) return;

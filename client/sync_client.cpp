@@ -4,6 +4,9 @@
 namespace mpf {
 namespace {
 
+// One is enough without further replies. With these, the dispatcher looks at deadlines after some.
+constexpr int kMaxLooks = 64;
+
 std::string limitExceeded(const Message& message, std::uint64_t maxBytes) {
   return ": " + std::to_string(message.body().size()) + " bytes, the limit is " +
          std::to_string(maxBytes);
@@ -72,7 +75,8 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout, Retry retry) {
   if (!answer_) {
     // Delivers `expired` if the server has not received the request. Otherwise the server may still
     // act on the request.
-    dispatcher_.runOnce(Deadline::atNs(0));
+    for (int looks = 0; looks < kMaxLooks && !answer_; ++looks)
+      if (!dispatcher_.runOnce(Deadline::atNs(0))) break;
     if (!answer_) {
       client_.cancel(awaited_);
       answer_.emplace(Fate::outcomeUnknown);

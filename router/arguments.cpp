@@ -178,7 +178,7 @@ void RouterArguments::addOverrides(CLI::App& app) {
   add("mode", "MODE",
       "Which users of this host may be clients of remote servers, octal as for chmod; default: "
       "0600, the router's own user");
-  add("group", "GROUP", "Group to which --mode applies; default: the user's own");
+  add("group", "GROUP", "Group of --mode; default: the user's primary group");
   add("log-level", "LEVEL",
       "Lowest level of the messages on stderr: trace, debug, info, warning, error, critical, off; "
       "default: info");

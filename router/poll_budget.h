@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // PollBudget: for how long a router polls after traffic, before it sleeps.
 //
-// A wait of at least kMaxNs quarters the time, a shorter one doubles it, up to kMaxNs. As long as
-// less than two of three waits are short, as with single requests in long intervals, polling costs
-// next to nothing.
+// A wait of at least kMaxNs quarters the time, a shorter one doubles it, up to kMaxNs. Unless
+// two of three waits are short, the time stays near its minimum, as with single requests in long
+// intervals.
 //
 // Threads  one.
 #pragma once

@@ -44,7 +44,7 @@ class Polling {
 
   // Messages have arrived or were sent.
   void noteTraffic();
-  // As noteTraffic(), and polls this window, too, as long as no kMaxWindows others are busier.
+  // As noteTraffic(), and polls this window, too, unless kMaxWindows others are busier.
   void add(Polled& window);
   // Call it after messages were handed over. While this object polls, it yields the processor, so
   // that receivers on the same processor run, and looks at the windows, once in each turn. After a

@@ -28,7 +28,9 @@ UserBuilder::UserBuilder(UserMessage message)
     : message_(std::move(message)), builder_(segmentOf(message_)) {}
 
 UserMessage UserBuilder::finish() && {
-  const auto words = static_cast<std::uint32_t>(builder_.getSegmentsForOutput()[0].size());
+  const auto segments = builder_.getSegmentsForOutput();
+  KJ_REQUIRE(segments.size() == 1, "finish() of a user message before initRoot()");
+  const auto words = static_cast<std::uint32_t>(segments[0].size());
   // number of segments less one, then the words of the segment; little-endian
   std::array<std::uint8_t, 8> table{};
   for (std::size_t i = 0; i < 4; ++i) table[4 + i] = static_cast<std::uint8_t>(words >> 8 * i);

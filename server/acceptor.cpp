@@ -51,6 +51,18 @@ void Acceptor::rescan() {
   const auto fromNs = Clock::nowNs();
   if (fromNs < rescanFromNs_) return;
   isRescanDue_ = false;
+  try {
+    acceptFound();
+  } catch (const std::exception& error) {
+    isRescanDue_ = true;  // again after the next knock
+    noteFailure(error);
+  }
+  const auto nowNs = Clock::nowNs();
+  rescanFromNs_ = nowNs + kRestAfterRescan * (nowNs - fromNs);
+}
+
+// Accepts the clients of links whose names exist.
+void Acceptor::acceptFound() {
   const auto prefix = SegmentName::linkPrefix(endpoint_.backplane().name(),
                                               endpoint_.window().header().incarnation);
   std::size_t accepted = 0;
@@ -60,8 +72,6 @@ void Acceptor::rescan() {
     if (++accepted > kMaxLinksPerRescan) break;
     accept(parsed->incarnation);
   }
-  const auto nowNs = Clock::nowNs();
-  rescanFromNs_ = nowNs + kRestAfterRescan * (nowNs - fromNs);
 }
 
 void Acceptor::accept(std::uint64_t incarnation) {
@@ -69,11 +79,15 @@ void Acceptor::accept(std::uint64_t incarnation) {
   try {
     tryAccept(incarnation);
   } catch (const std::exception& error) {
-    // The client is not accepted and knocks again; the server continues.
-    const auto shortage = shortageOf(error);
-    if (shortage == layout::Shortage::none) return count(endpoint_.control().protocolErrors);
-    noteShortage(shortage, error.what());
+    noteFailure(error);
   }
+}
+
+// A client is not accepted and knocks again; the server continues.
+void Acceptor::noteFailure(const std::exception& error) {
+  const auto shortage = shortageOf(error);
+  if (shortage == layout::Shortage::none) return count(endpoint_.control().protocolErrors);
+  noteShortage(shortage, error.what());
 }
 
 void Acceptor::tryAccept(std::uint64_t incarnation) {
@@ -102,9 +116,8 @@ void Acceptor::open(std::unique_ptr<Link> link) {
     link->notifyPeer();
     return;
   }
-  auto& connection = connections_.add(*index, std::move(link));
+  connections_.open(connections_.add(*index, std::move(link)));
   noteShortage(layout::Shortage::none, {});
-  connections_.open(connection);
 }
 
 // Each shortage counts as one alarm, for any number of clients that the server cannot accept.

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <string>
@@ -36,9 +37,11 @@ class Acceptor {
 
  private:
   void rescan();
+  void acceptFound();
   void accept(std::uint64_t incarnation);
   void tryAccept(std::uint64_t incarnation);
   void open(std::unique_ptr<Link> link);
+  void noteFailure(const std::exception& error);
   void noteShortage(layout::Shortage shortage, const std::string& why);
 
   Endpoint& endpoint_;

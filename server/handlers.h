@@ -31,6 +31,7 @@ class Handlers {
   //   ofRun  for waiting requests of one client that are handled together; may be empty
   void set(MessageType type, HandleMessage ofMessage, HandleRun ofRun = {}) {
     auto made = std::make_unique<Handler>(std::move(ofMessage), std::move(ofRun));
+    replaced_.reserve(replaced_.size() + 1);  // nothing fails after the exchange
     auto replaced = std::exchange(handlers_.at(static_cast<std::size_t>(type)), std::move(made));
     if (calls_ != 0) replaced_.push_back(std::move(replaced));
   }

@@ -69,7 +69,7 @@ class ServerCore {
   [[nodiscard]] bool isInterrupted() const noexcept {
     return stop_.load(std::memory_order_relaxed);
   }
-  // Removes the request that was received last from the window: it has been handled, or was kept.
+  // Clears the last received request in the window: it has been handled, or was kept.
   void endHandling() noexcept { progress_.end(); }
   [[nodiscard]] Deadline takeBefore() const noexcept {
     return takeBeforeNs_ == 0 ? Deadline::never() : Deadline::atNs(takeBeforeNs_);

@@ -42,7 +42,7 @@ Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::str
         interrupt();
       }) {}
 
-std::optional<std::uint32_t> Endpoint::tryReserve() noexcept {
+std::optional<std::uint32_t> Endpoint::tryReserve() {
   if (!freeIndices_.empty()) {
     const auto index = freeIndices_.back();
     freeIndices_.pop_back();
@@ -50,6 +50,7 @@ std::optional<std::uint32_t> Endpoint::tryReserve() noexcept {
   }
   if (links_.size() >= layout::kMaxLinks) return std::nullopt;
   links_.push_back(nullptr);
+  freeIndices_.reserve(links_.capacity());  // detach() must not fail
   return static_cast<std::uint32_t>(links_.size() - 1);
 }
 

@@ -53,7 +53,8 @@ class Endpoint {
 
   // --- links ---
   // Reserves an index (the bit of a new link); nullopt if all are in use.
-  std::optional<std::uint32_t> tryReserve() noexcept;
+  //   throws  std::bad_alloc
+  std::optional<std::uint32_t> tryReserve();
   // Adds the link of a reserved index. The endpoint owns neither it nor its user.
   void attach(std::uint32_t index, Link& link, LinkUser& user);
   // Removes the link and frees its index.

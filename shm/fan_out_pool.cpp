@@ -65,8 +65,8 @@ std::shared_ptr<FanOutChunk> FanOutPool::tryAlloc(std::size_t bytes) noexcept tr
     const std::lock_guard lock(mutex_);
     if (auto chunk = tryReuse(bytes)) return chunk;
     if (!tryMakeRoom(needed)) return nullptr;
-    bytes_ += needed;
     if (created_ == layout::kReturnsFanOut) return nullptr;  // no number is used twice
+    bytes_ += needed;
     number = created_++;
   }
   return tryCreate(needed, number);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Histograms in shared memory: counts durations in buckets.
 //
-// Threads  one thread adds, but recordFromAnyThread(): any. Any thread of any process reads.
+// Threads  record(): one; recordFromAnyThread(): any. Any thread of any process reads.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ inline void count(layout::Word64& counter, std::uint64_t by = 1) noexcept {
 }
 
 struct HistogramBuckets {
-  // Bucket 0 covers 0 to 20 ns: up to 16 ns and a quarter of 16 ns.
+  // Bucket 0 covers 0 to 20 ns: 16 ns and a quarter of it.
   static constexpr std::uint32_t kFirstPower = 4;
 
   [[nodiscard]] static std::uint32_t indexOf(std::uint64_t ns) noexcept {

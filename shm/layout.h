@@ -131,7 +131,7 @@ static_assert(offsetof(SegmentHeader, queueSlots) == 224 &&
               offsetof(SegmentHeader, moreReplySlots) == 312);
 
 // Log-linear histogram of durations [ns]: 4 buckets for each power of two, from 16 ns to 2^40 ns.
-// Written by one thread, but `serviceNs` of a server by all that reply.
+// Written by one thread; a server's `serviceNs` by all that reply.
 inline constexpr std::uint32_t kHistogramBuckets = 4 * 37;
 struct Histogram {
   std::array<Word64, kHistogramBuckets> buckets;

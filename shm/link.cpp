@@ -145,13 +145,13 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   auto segment = Segment::tryOpen(name, layout::SegmentKind::link, Segment::Access::readWrite);
   if (!segment) return nullptr;
   const auto& header = segment->header();
-  const auto& offer = own.header();
   checkGeometry(header, name);
-  if (header.serverWindow != offer.incarnation || header.maxPoolBytes > offer.maxPoolBytes ||
+  const auto& offer = own.header();
+  if (header.serverWindow != offer.incarnation || header.maxMessageBytes > offer.maxMessageBytes ||
+      header.maxPoolBytes > offer.maxPoolBytes ||
       segment->bytes() != linkBytes(LinkGeometry::forQueue(header.queueSize))) {
-    throw SegmentError(fmt::format(
-        "{}: a link whose server, pool limit or length differs from what this server offers",
-        segments::path(name)));
+    throw SegmentError(segments::path(name) +
+                       ": server, limits or length differ from what this server offers");
   }
   MPF_STEP(link_mapped);
   segment->closeFile();

@@ -39,7 +39,7 @@ struct SecondRing {
 
 class RingConsumer {
  public:
-  //   polledOn   on which processor the owner polls (LinkControl); nullptr: nobody is told
+  //   polledOn   on which processor the owner polls (LinkControl); nullptr: not reported
   RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own,
                const SecondRing& second = {}, layout::Word32* polledOn = nullptr) noexcept
       : slots_(slots),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// TimeSampler: chooses which messages get a time stamp. To a peer that polls: the first in each 64.
-// To another: all of them, or of fast traffic one in 2 to 64, because reading the clock costs as
-// much as a message. The recent rate decides. The distance between samples varies, so that bursts
+// TimeSampler: chooses which messages get a time stamp. If the peer polls: the first of each 64.
+// Otherwise all, or at a high recent rate one of 2 to 64, because reading the clock costs as much
+// as a message. The distance between samples varies, so that bursts
 // are sampled evenly, from their first messages, which wake the peer, to their last ones. After a
 // rest, all messages are timed until the rate is known again. Of messages that are sent as one run,
 // only the first may be timed.

@@ -56,16 +56,16 @@ int convert(const ConvertArguments& arguments) try {
 }  // namespace
 
 void addConvert(CLI::App& app, Run& run) {
-  auto& command = *app.add_subcommand(
-      "convert", "Writes the crate file that a startup file of the original MPF amounts to");
+  auto& command =
+      *app.add_subcommand("convert", "Converts a startup file of the original MPF to a crate file");
   auto arguments = std::make_shared<ConvertArguments>();
   arguments->source.addOptions(command);
   command.add_option("--output", arguments->folder, "Folder for the files")
       ->capture_default_str()
       ->type_name("FOLDER");
   command.footer(
-      "Carriers without --carrier become models: boards of 2001 sit on buses that no "
-      "Linux host reaches.\nLines that are skipped are listed with the reason.");
+      "Carriers without --carrier become models: Linux hosts cannot reach the buses of boards of "
+      "2001.\nLines that are skipped are listed with the reason.");
   command.callback([arguments, &run] { run = [arguments] { return convert(*arguments); }; });
 }
 

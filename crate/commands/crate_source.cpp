@@ -25,12 +25,12 @@ void CrateSource::addOptions(CLI::App& command) {
       ->required();
   command
       .add_option("--carrier", carriers_,
-                  "KIND: replaces the boards of all carriers, such as model for device models; "
-                  "NAME=KIND: replaces one; may be repeated")
+                  "KIND replaces the boards of all carriers (model: device models), NAME=KIND "
+                  "those of one; may be repeated")
       ->allow_extra_args(false)
       ->type_name("[NAME=]KIND");
   command.add_option("--address", address_,
-                     "Replaces the addresses of routers in a startup file, such as 127.0.0.1");
+                     "Address for all routers of a startup file, such as 127.0.0.1");
   command
       .add_option("--define", symbols_,
                   "Defines a symbol of a startup file, as cdCommands of a site does, such as "

@@ -160,7 +160,7 @@ void addLogs(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<LogArguments>();
   command.add_option("process", arguments->process, "Name of the process")->required();
   command.add_flag("-f,--follow", arguments->follow, "Also show what it prints from now on");
-  command.add_option("-n,--lines", arguments->lines, "How many lines of the past")
+  command.add_option("-n,--lines", arguments->lines, "Earlier lines to show")
       ->capture_default_str();
   addCrateOption(command, arguments->crate);
   command.callback([arguments, &run] { run = [arguments] { return showLog(*arguments); }; });

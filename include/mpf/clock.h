@@ -47,9 +47,9 @@ struct Clock {
   }
 };
 
-// The time at which a wait ends without a result. A small value: copy it freely. A deadline that
-// has passed already makes a wait look once and return. Deadlines compare by time; never() is later
-// than all others.
+// The time at which a wait ends without a result. A small value: copy it freely. With a deadline
+// that has passed, a wait checks once and returns. Deadlines compare by time; never() is later than
+// all others.
 class Deadline {
  public:
   // A deadline that never passes.
@@ -77,8 +77,8 @@ class Deadline {
   // never(). Adding to Nanoseconds::max() overflows: test isNever() before.
   [[nodiscard]] Nanoseconds left() const noexcept {
     if (isNever()) return Nanoseconds::max();
-    const auto left = ns_ - Clock::nowNs();
-    return Nanoseconds(left > 0 ? left : 0);
+    const auto now = Clock::nowNs();
+    return Nanoseconds(ns_ > now ? ns_ - now : 0);
   }
   // The earlier deadline is the smaller one: std::min(a, b) passes first.
   friend auto operator<=>(const Deadline&, const Deadline&) = default;

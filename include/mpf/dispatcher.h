@@ -11,9 +11,9 @@
 //   client.bind("dac");
 //   dispatcher.run();
 //
-// Threads  one thread at a time calls runOnce(), run() and runPending(): a second thread gets
-//          std::logic_error. Any thread may call interrupt(), nextDeadline() and the functions of
-//          clients. Callbacks run on the thread that runs the dispatcher.
+// Threads  one thread at a time calls runOnce(), run(), runPending() and descriptor(): a second
+//          thread gets std::logic_error. Any thread may call interrupt(), nextDeadline() and the
+//          functions of clients. Callbacks run on the thread that runs the dispatcher.
 // Throws   an exception that leaves a callback leaves the call that runs it: runOnce(), run(),
 //          runPending() or connectWait(). The message of that callback counts as delivered, nothing
 //          else is lost, and the next call continues with the remaining messages. The thread of the
@@ -69,6 +69,7 @@ class Dispatcher {
   // For event loops: poll() the descriptor for reading, at most until nextDeadline(), then call
   // runPending(), which makes the descriptor unreadable until there is something to do again. The
   // dispatcher owns the descriptor.
+  //   throws  std::logic_error when another thread runs the dispatcher
   [[nodiscard]] int descriptor();
   // Does what can be done without waiting, in at most `batches` steps of some messages each.
   // Returns false when there may be more to do; the descriptor then stays readable.

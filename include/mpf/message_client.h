@@ -74,7 +74,8 @@ class MessageClient {
   //   throws  std::bad_alloc; bind() allocates the memory of the connection
   MessageClient(Dispatcher& dispatcher, Callback callback);
   // No callback runs after the destructor has returned. Unless it is called on the thread that runs
-  // the dispatcher, it waits until a callback of this client that is in progress has returned.
+  // the dispatcher, it waits until the callback in progress, of any client of the dispatcher, has
+  // returned.
   ~MessageClient();
   MessageClient(const MessageClient&) = delete;
   MessageClient& operator=(const MessageClient&) = delete;
@@ -84,7 +85,7 @@ class MessageClient {
   // connection fails, for example because /dev/shm is full, notConnectedBecause() returns the
   // reason and the client tries again.
   //   throws  std::invalid_argument when `server` is not a valid name, std::logic_error when the
-  //           client is already bound
+  //           client is already bound, and in the child of a fork
   void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
 
   // Sets the callback for replies of type T whose body is valid. Call it once, before bind(). If T
@@ -96,9 +97,9 @@ class MessageClient {
   //       [&](std::span<const mpf::Int32> values, const mpf::Message& first) { ... });
   //
   //   values  at least one, in the order of the replies; copies, valid until the callback returns
-  //   first   the message of the first value. Its clientType, clientExtra and time stamp are those
-  //           of all values, which are replies to its request, or each the first reply to another
-  //           one. A request has ended after its first reply
+  //   first   the message of the first value. All values have its clientType, clientExtra and time
+  //           stamp. They are replies to one request, or first replies to one request each, which
+  //           they end
   //   throws  std::invalid_argument when `callback` is empty, std::logic_error when the client is
   //           bound already, or onValues() was called before, for any type
   // A callback that throws has received all of the values.
@@ -160,18 +161,18 @@ class MessageClient {
     return MessageOf<T>::inBuffer(allocate(MessageOf<T>::bytesFor(n)), n);
   }
 
-  // Ends the request with the fate `cancelled`, if it has not ended yet. The server may act on the
-  // request all the same, and the request counts as outstanding until the server has replied to it
-  // or refused it. Called in a callback, cancel() delivers the fate before it returns; otherwise
-  // the dispatcher delivers it when it runs next, before any reply.
+  // Ends the request with the fate `cancelled`, if it has not ended yet. The server may still act
+  // on the request, which counts as outstanding until the server has replied to it or refused it.
+  // Called in a callback, cancel() delivers the fate before it returns; otherwise the dispatcher
+  // delivers it when it runs next, before any reply.
+  //   throws  in a callback: what the callback throws that gets the fate
   void cancel(std::uint32_t requestId);
 
   // --- the connection
 
-  // Waits until the client is connected; returns false after `timeout`. While it waits, it runs a
-  // dispatcher that has no thread, unless another thread runs the dispatcher or ran it last: then
-  // it waits until that thread has connected the client. SyncClient::connectWait() always runs its
-  // dispatcher.
+  // Waits until the client is connected; returns false after `timeout`. It runs the
+  // dispatcher meanwhile, unless the dispatcher has a thread, or another thread runs it or ran it
+  // last: then it waits for that thread. SyncClient::connectWait() always runs its dispatcher.
   //   throws  what a callback throws that it runs
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
   [[nodiscard]] bool isConnected() const noexcept;

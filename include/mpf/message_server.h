@@ -14,8 +14,10 @@
 //   }
 //
 // Threads  one thread waits and receives; any thread may call reply(), replyMany(),
-//          allocReplyMessage(), allocShared(), publish(), isClientConnected(), countAlarm() and
-//          interrupt().
+//          allocReplyMessage(), allocShared(), publish(), refuse(), isClientConnected(),
+//          countAlarm() and interrupt().
+// Fork     in the child of a fork, the parent's servers refuse to work: waitForMessage(), receive()
+//          and what calls them throw std::logic_error, replies return clientGone.
 // Crash    when a client dies, the handles of its requests stay valid; replies to them return
 //          clientGone. Its shared memory is freed when the last of these handles is destroyed;
 //          published messages that it held are freed at once.
@@ -75,7 +77,7 @@ enum class ReplyResult {
 
 // The result of MessageServer::replyMany().
 struct RepliedMany {
-  std::size_t count = 0;  // replies sent; of messages, also those whose client is gone
+  std::size_t count = 0;  // replies sent, and messages whose client is gone
   ReplyResult result = ReplyResult::sent;  // why the next one was not sent; `sent` when all were
 };
 
@@ -107,13 +109,13 @@ class MessageServer {
   // Returns the next request, or an empty handle when no request waits. Also accepts clients and
   // closes the connections of dead ones. A request whose deadline has passed ends as `expired` and
   // is not returned. A request ends as `refused` when its handle is destroyed before a reply.
-  //   throws  what the callback of onClient() throws
+  //   throws  what the callback of onClient() throws; std::logic_error in the child of a fork
   Message receive();
   // Ends the call of waitForMessage() or run() that is in progress, or else the next one; waiting
   // requests stay in their queues. Any thread; async-signal-safe.
   void interrupt() noexcept;
   // Returns a number for the connection that `request` was received on; 0 when it is closed. Two
-  // connections never have the same number.
+  // connections of this server never have the same number.
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
   // Whether that client is still connected and alive. Any thread, also during a handler: clientOf()
   // notices a dead client only when the thread of the server has called receive() again.
@@ -212,7 +214,7 @@ class MessageServer {
   // another in its own place. What it gets depends on its parameter:
   //
   //   T&               the fields of one request, which is then sent as the reply
-  //   MessageOf<T>&    one request, with its elements and marks, which is then sent as the reply
+  //   MessageOf<T>&    one request as a handle, which is then sent as the reply
   //   MessageOf<T>&&   the same; the handler owns the request and replies to it, now or later
   //   std::span<T>     the fields of up to 16 waiting requests of one client, scalars. They are
   //                    sent as the replies, in order, after the handler has returned. A request
@@ -264,7 +266,8 @@ class MessageServer {
 
   // Sets a callback for a shortage: receive() calls it with the reason when this process can accept
   // no more clients because it has no file descriptors or memory left, and with an empty text when
-  // it can again. Each shortage also counts as an alarm. Set it before the first receive().
+  // it can again. Each shortage also counts as an alarm. Set it before the first receive(). It must
+  // not throw.
   void onShortage(std::function<void(const std::string& why)> callback);
 
   // Counts one fault of the hardware that the server drives; `mpf msr` shows the number. Any

@@ -83,7 +83,7 @@ enum class Fate : std::int32_t {
   // may have been done.
   outcomeUnknown = 2,
   expired = 3,  // its deadline passed before the server received it: nothing was done
-  // The client called cancel(); the server may act on it all the same. A late reply is dropped.
+  // The client called cancel(); the server may still act on it. A late reply is dropped.
   cancelled = 4,
 };
 // Indexed by the value of the fate.

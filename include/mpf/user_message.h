@@ -30,6 +30,7 @@ class UserBuilder {
  public:
   // Fills the memory of the message with zeroes, as Cap'n Proto requires.
   //   message   its size is the room for the segment table (8 bytes) and the segment
+  //   throws    kj::Exception if that is less than 16 bytes
   explicit UserBuilder(UserMessage message);
 
   // The struct to fill in. Its builder is valid until finish().
@@ -38,6 +39,7 @@ class UserBuilder {
     return builder_.initRoot<Root>();
   }
   // Returns the message, with the size that the struct uses, ready to be sent.
+  //   throws  kj::Exception before initRoot()
   [[nodiscard]] UserMessage finish() &&;
 
  private:

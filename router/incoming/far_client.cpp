@@ -26,7 +26,7 @@ std::int64_t FarClient::fullWindow() const noexcept {
 namespace {
 
 void checkId(std::uint32_t requestId) {
-  if (requestId == 0) throw ProtocolError(FarewellCode::PROTOCOL, "requestId 0");
+  if (requestId == 0) throw ProtocolError(FarewellCode::PROTOCOL, "invalid requestId 0");
 }
 
 }  // namespace

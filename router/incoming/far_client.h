@@ -69,8 +69,8 @@ class FarClient {
   void request(wire::Request::Reader request);
   void request(PlainItem& item);
   void credit(std::uint32_t bytes);
-  // The server is gone: receives the messages that it had sent, regardless of the window, and then
-  // the disconnect.
+  // The server is gone: receives the messages that it had sent, drops those beyond the window, and
+  // then receives the disconnect.
   void onServerGone();
   // Ends all held requests, and those that arrive later, with `fate`.
   void giveUp(Fate fate, const std::string& why);

@@ -130,7 +130,7 @@ void RemoteServers::onServer(wire::Server::Reader server) {
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
       break;
-    case wire::Server::State::ABSENT:  // no request without an end was taken there
+    case wire::Server::State::ABSENT:  // every request taken there has ended
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);
       break;

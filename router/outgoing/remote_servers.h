@@ -5,7 +5,7 @@
 //
 // It exists longer than a connection: connect() binds the servers over a new connection,
 // disconnect() destroys their proxies. A server that no client has used or waited for during
-// kIdleProxyTime is unbound and forgotten.
+// kIdleProxyNs is unbound and forgotten.
 //
 // Threads  that of the event loop.
 // Trust    any violation of the protocol is a ProtocolError.

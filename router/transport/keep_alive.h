@@ -47,8 +47,8 @@ class KeepAlive {
   [[nodiscard]] std::string check(std::int64_t nowNs);
 
   void pingSent(std::int64_t nowNs) noexcept { lastPingNs_ = nowNs; }
-  // While the pings of the peer make those of this side unnecessary, this side sends one now and
-  // then all the same, to measure the round trip.
+  // The pings of the peer make those of this side unnecessary. True when one is due all the same,
+  // to measure the round trip.
   [[nodiscard]] bool shouldMeasure(std::int64_t nowNs) const noexcept;
   // The peer has sent a ping. Returns true when the next check is later now: call beginCheck().
   [[nodiscard]] bool tryPostpone(std::int64_t nowNs);

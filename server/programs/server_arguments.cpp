@@ -59,7 +59,7 @@ void ServerArguments::addTo(CLI::App& app) {
          [this](const std::string& name) {
            take("--group", name, parseGroup, messages.rights.group);
          },
-         "The group of --mode; default: the primary group of the user")
+         "Group of --mode; default: the user's primary group")
       ->needs(mode);
   app.add_option("--log-level", logLevel, "Lowest level of log lines on stderr")
       ->check(CLI::IsMember(ServerLog::levels()))

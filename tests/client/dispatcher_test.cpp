@@ -34,6 +34,26 @@ TEST_F(ClientTest, ADescriptorWakesAnEventLoop) {
   messages_.clear();
 }
 
+// The thread of the event loop waits, also after another thread has run the dispatcher.
+TEST_F(ClientTest, AThreadOfAnEventLoopIsWokenForAnEarlierDeadline) {
+  auto& server = startServer();
+  bind();
+  while (dispatcher_.runOnce(Deadline::after(1ms))) {
+  }
+  pollfd descriptor{dispatcher_.descriptor(), POLLIN, 0};
+  std::thread([&] {
+    while (!dispatcher_.runPending()) {
+    }
+  }).join();
+  ASSERT_EQ(::poll(&descriptor, 1, 0), 0);
+
+  ASSERT_EQ(client_.send(Int32Message(), Deadline::after(1ms)), SendResult::sent);
+
+  EXPECT_EQ(::poll(&descriptor, 1, 0), 1);
+  while (server.receive()) {
+  }
+}
+
 TEST_F(ClientTest, AClientMayBeDestroyedInItsOwnCallback) {
   startServer().on<Int32>([](Int32&) {});
   std::unique_ptr<MessageClient> brief;

@@ -39,6 +39,26 @@ TEST(SyncClientTest, ReturnsMessagesThatHaveArrivedWithoutWaiting) {
   EXPECT_FALSE(client.receive(0s));
 }
 
+// The dispatcher looks at deadlines only after some messages of a busy link.
+TEST(SyncClientTest, ARequestExpiresBesideFurtherReplies) {
+  const TestBackplane backplane;
+  MessageServer server(backplane, "device", {.queueSize = 200});
+  Message held;
+  server.on<Int32>([&](Int32Message&& request) {
+    static_cast<void>(server.reply(server.allocReplyMessage<Int32>(request)));
+    held = std::move(request);
+  });
+  std::thread thread([&] { server.run(); });
+  SyncClient client(backplane, "device");
+  ASSERT_TRUE(client.call(Int32Message(), 60s));
+  server.interrupt();
+  thread.join();
+  for (int i = 0; i < 50; ++i)
+    ASSERT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
+
+  EXPECT_EQ(client.call(Int32Message(), 0s).fate(), Fate::expired);
+}
+
 TEST(SyncClientTest, ReportsWhyThereIsNoReply) {
   const Watchdog watchdog("sync client");
   const TestBackplane backplane;

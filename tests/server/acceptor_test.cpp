@@ -126,5 +126,23 @@ TEST_F(AcceptorTest, AShortageIsOneAlarmUntilAClientIsAccepted) {
   EXPECT_EQ(valueOf(control().protocolErrors), 0u);
 }
 
+TEST_F(AcceptorTest, ARescanDuringAShortageIsRepeated) {
+  auto& link = createLink();
+  const auto requestRescan = [&] {
+    server_->endpoint.window().hints().rescan.store(1, std::memory_order_relaxed);
+  };
+
+  {
+    const NoDescriptors none;
+    requestRescan();
+    acceptor_.acceptAll();
+  }
+  EXPECT_EQ(control().shortage.load(std::memory_order_relaxed), layout::Shortage::descriptors);
+  while (link.peerState() != LinkState::open) acceptor_.acceptAll();
+
+  EXPECT_EQ(control().shortage.load(std::memory_order_relaxed), layout::Shortage::none);
+  EXPECT_EQ(valueOf(control().protocolErrors), 0u);
+}
+
 }  // namespace
 }  // namespace mpf::test

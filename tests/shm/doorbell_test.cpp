@@ -69,6 +69,11 @@ TEST_F(DoorbellTest, ASleepEndsAtItsDeadline) {
   while (!deadline.hasPassed()) doorbell::sleep(bell_, 0, deadline);
 }
 
+TEST(DeadlineTest, HasNoTimeLeftHoweverEarlyItIs) {
+  EXPECT_EQ(Deadline::after(Nanoseconds::min()).left(), Nanoseconds(0));
+  EXPECT_EQ(Deadline::atNs(INT64_MIN).left(), Nanoseconds(0));
+}
+
 TEST_F(DoorbellTest, APassedDeadlineDoesNotSleep) {
   doorbell::sleep(bell_, 0, Deadline::after(-1h));
   doorbell::sleep(bell_, 0, Deadline::atNs(0));

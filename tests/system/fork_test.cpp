@@ -93,6 +93,7 @@ TEST_F(ForkTest, AChildThatDestroysObjectsDoesNotChangeTheParents) {
   const auto names = backplane_.segmentNames();
 
   const auto status = inChild([&] {
+    EXPECT_EQ(client_->alloc<Float64Array>(100'000).getLength(), 100'000u);
     sync_.reset();
     client_.reset();
     server_.reset();

@@ -237,7 +237,7 @@ void addCall(CLI::App& app, Run& run) {
       "fields", arguments->fields,
       R"(Its fields, as field=value: value=3, value=1,2,3, value='*IDN?\n', eomString='\r\n')");
   addSeconds(command, "--timeout", arguments->timeout, "Longest wait for a reply", false);
-  command.add_option("--count", arguments->count, "Messages to send, one after the other's reply")
+  command.add_option("--count", arguments->count, "Messages to send, each after a reply")
       ->capture_default_str()
       ->check(wholeNumber(1, std::uint64_t{1} << 53));
   addSeconds(command, "--interval", arguments->interval, "Pause between them", true);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf doctor: finds settings of this host that make MPF fail or slow, and names the remedy of each.
+// mpf doctor: finds settings of this host that make MPF fail or slow it, and names remedies.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fmt/format.h>
@@ -49,7 +49,7 @@ int examine(bool asJson) {
 
 void addDoctor(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "doctor", "Finds settings of this host that make MPF fail or slow, and names the remedy");
+      "doctor", "Finds settings of this host that make MPF fail or slow it, and names the remedy");
   auto json = std::make_shared<bool>(false);
   addJson(command, *json);
   command.footer("Exit status: 0 no problem (there may be warnings); 1 at least one problem.");

@@ -130,7 +130,7 @@ void addTop(CLI::App& app, Run& run) {
       .add_option("--batch", arguments->batch,
                   "Print the table this number of times, without a live screen")
       ->check(wholeNumber(1, 1'000'000'000));
-  auto* clients = command.add_flag("--clients", arguments->clients, "Begin with the clients");
+  auto* clients = command.add_flag("--clients", arguments->clients, "Show the clients first");
   command.add_flag("--routers", arguments->routers, "Begin with the connections to other hosts")
       ->excludes(clients);
   command.add_option("--sort", arguments->sort, "Heading of the column to sort by");

@@ -95,7 +95,7 @@ void addTap(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<TapArguments>();
   addServer(command, *arguments);
   addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
-  command.add_option("--count", arguments->count, "Number of messages after which to end; 0: any")
+  command.add_option("--count", arguments->count, "End after this many messages; 0: no limit")
       ->capture_default_str()
       ->check(wholeNumber(0));
   command.add_option("--link", arguments->link, "Only this link: its 16 hexadecimal digits");

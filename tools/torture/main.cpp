@@ -101,7 +101,7 @@ void addOptions(CLI::App& command, Arguments& arguments) {
   auto& options = arguments.campaign;
   options.referee.seed = std::random_device()();
   tools::addSeconds(command, "--duration", arguments.seconds,
-                    "Time for random places, after one round for each step", true);
+                    "Time for random steps, after one round for each", true);
   command
       .add_option("--seed", options.referee.seed,
                   "Seed of the random numbers; it is printed at the end")
@@ -110,7 +110,7 @@ void addOptions(CLI::App& command, Arguments& arguments) {
   command.add_option("--step", options.steps, "Only this step; may be given several times");
   addChoice(command, "--role", options.role, kRoles, "Only clients, or only servers");
   addChoice(command, "--mode", options.mode, kModes, "Only kill, or only stop for a while");
-  command.add_option("--hit", options.hit, "Number of the visit to the step, from 1")
+  command.add_option("--hit", options.hit, "Which visit to the step, from 1")
       ->check(wholeNumber(1));
   command
       .add_option("--instructions", options.instructions,

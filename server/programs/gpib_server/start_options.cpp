@@ -39,8 +39,7 @@ std::optional<int> GpibStartOptions::parse(int argc, char** argv) {
   addLimit(app, "--timeout", limits.timeout, "Timeout of requests that have none [s]");
   addLimit(app, "--max-timeout", limits.maxTimeout,
            "Longest time that one request may wait and use the bus [s]");
-  addLimit(app, "--max-lease", limits.maxLease,
-           "Longest time that one client may have the bus for itself [s]");
+  addLimit(app, "--max-lease", limits.maxLease, "Longest lease of the bus by one client [s]");
   ti9914.addTo(app);
   hardware.addTo(app);
   app.get_option("--wait")->description("Start even if the controller is missing, and wait for it");

@@ -53,10 +53,9 @@ void Hardware::addTo(CLI::App& app) {
   app.add_option("--wires", wiresPath_,
                  "File that connects the models of several programs; the first program creates it")
       ->type_name("FILE");
-  app.add_option(
-         "--real-time", priority_,
-         "Real-time priority of the threads that serve interrupts, if the user may have it; "
-         "0: ordinary priority")
+  app.add_option("--real-time", priority_,
+                 "Real-time priority of the threads that serve interrupts, where permitted; "
+                 "0: ordinary priority")
       ->type_name("N")
       ->check(CLI::Range(0, 99))
       ->capture_default_str();
