@@ -222,15 +222,16 @@ void Binding::onTime(std::int64_t nowNs) {
 void Binding::expire(std::int64_t nowNs) {
   const auto requests = sender_.requests();
   const auto channel = sender_.channel();
-  requests->forEach([&](Request& request) {
+  // PAIR(taken-before-clock): if the server has not counted a request as taken, it will see that
+  // the deadline has passed.
+  doorbell::fence();
+  std::uint32_t at = 0;
+  std::int64_t nextNs = INT64_MAX;
+  while (const auto id = sender_.findExpired(at, nowNs, nextNs)) {
+    deliverFate(*requests->find(id), Fate::expired);
     if (sender_.channel() != channel || !isLinked()) return;  // a callback ran the dispatcher
-    if (request.deadlineNs == 0 || request.isGivenUp) return;
-    if (request.deadlineNs > nowNs) return timer_.wakeAt(request.deadlineNs);
-    // PAIR(taken-before-clock): if the server has not counted it as taken, it will see that the
-    // deadline has passed.
-    doorbell::fence();
-    if (!sender_.isTaken(request)) deliverFate(request, Fate::expired);
-  });
+  }
+  if (nextNs != INT64_MAX) timer_.wakeAt(nextNs);
 }
 
 void Binding::expireUntaken(std::int64_t nowNs) {

@@ -323,9 +323,19 @@ void RequestSender::close() noexcept {
   ended = std::move(channel_);
 }
 
-bool RequestSender::isTaken(const Request& request) const noexcept {
+// Under the lock: a request that is being sent may yet be taken back.
+std::uint32_t RequestSender::findExpired(std::uint32_t& at, std::int64_t nowNs,
+                                         std::int64_t& nextNs) noexcept {
   const BiasedLock::Guard lock(*lock_);
-  return channel_->link().outgoing().isTaken(request.ordinal);
+  while (const auto* const request = requests_->next(at)) {
+    if (request->deadlineNs == 0 || request->isGivenUp) continue;
+    if (request->deadlineNs > nowNs) {
+      nextNs = std::min(nextNs, request->deadlineNs);
+    } else if (!channel_->link().outgoing().isTaken(request->ordinal)) {
+      return request->id.load(std::memory_order_relaxed);
+    }
+  }
+  return 0;
 }
 
 bool RequestSender::tryEndNudging() noexcept {

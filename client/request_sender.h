@@ -59,7 +59,11 @@ class RequestSender {
   [[nodiscard]] const std::shared_ptr<MessageLink>& channel() const noexcept { return channel_; }
   // nullptr before the first open().
   [[nodiscard]] const std::shared_ptr<RequestTable>& requests() const noexcept { return requests_; }
-  [[nodiscard]] bool isTaken(const Request& request) const noexcept;
+  // The id of the first request, from place `at` of the table on, whose deadline has passed and
+  // that the server has not counted as taken; 0: none. `at` becomes the next place. Lowers `nextNs`
+  // to the deadlines that have not passed of the requests before it.
+  [[nodiscard]] std::uint32_t findExpired(std::uint32_t& at, std::int64_t nowNs,
+                                          std::int64_t& nextNs) noexcept;
   // Keeps a request that no server has taken, if it has a copy: the request ends in the table, and
   // trySendUntaken() sends it. Returns false when it has none.
   [[nodiscard]] bool tryKeep(Request& request);

@@ -8,7 +8,8 @@
 // end.
 //
 // Threads  tryAllow(), tryReserve(), add() and takeBack(): one thread at a time, under the client's
-//          lock. The rest: the dispatcher's thread.
+//          lock. The rest: the dispatcher's thread, which holds this lock, too, if an entry may be
+//          taken back meanwhile.
 #pragma once
 
 #include <atomic>
@@ -104,16 +105,22 @@ class RequestTable {
     request.id.store(0, std::memory_order_release);
   }
 
+  // The first entry in use from place `at` on, or nullptr. `at` becomes the place after it.
+  Request* next(std::uint32_t& at) noexcept {
+    const auto inFirst = first_.mask + 1;
+    const auto all = inFirst + (hasGrown() ? second_.mask + 1 : 0);
+    while (at < all) {
+      auto& request = at < inFirst ? first_.at(at) : second_.at(at - inFirst);
+      ++at;
+      // PAIR(request-added): the fields of the entry.
+      if (request.id.load(std::memory_order_acquire) != 0) return &request;
+    }
+    return nullptr;
+  }
   template <class Visit>
   void forEach(Visit&& visit) {
-    const auto visitAll = [&](const Places& places) {
-      for (std::uint32_t at = 0; at <= places.mask; ++at) {
-        // PAIR(request-added): the fields of the entry.
-        if (places.at(at).id.load(std::memory_order_acquire) != 0) visit(places.at(at));
-      }
-    };
-    visitAll(first_);
-    if (hasGrown()) visitAll(second_);
+    std::uint32_t at = 0;
+    while (auto* const request = next(at)) visit(*request);
   }
 
  private:

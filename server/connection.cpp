@@ -15,12 +15,14 @@ Connection* freeConnections = nullptr;  // under freeMutex
 }  // namespace
 
 Connection::Pointer Connection::take() {
-  {
+  auto* connection = [] {
     const std::lock_guard guard(freeMutex);
-    if (freeConnections != nullptr)
-      return Pointer(std::exchange(freeConnections, freeConnections->nextFree));
-  }
-  return Pointer(new Connection);
+    return freeConnections == nullptr ? nullptr
+                                      : std::exchange(freeConnections, freeConnections->nextFree);
+  }();
+  if (connection == nullptr) connection = new Connection;
+  connection->forkGuard = {};
+  return Pointer(connection);
 }
 
 // Gives requests that differ in more bits different places, up to the size at which the client must
@@ -43,8 +45,13 @@ bool Connection::tryMakePlace(std::uint32_t requestId) noexcept try {
 }
 
 void Connection::GiveBack::operator()(Connection* connection) const noexcept {
-  // Still open: this process is a forked child, and the server and its handles are copies.
-  if (connection->channel) return delete connection;
+  if (connection->forkGuard.isInherited()) {
+    // Handles that were copied, too, may refer to it, so it is kept, and not used again. No lock:
+    // another thread might have held it at the fork.
+    static std::atomic<Connection*> inherited{nullptr};
+    connection->nextFree = inherited.exchange(connection, std::memory_order_relaxed);
+    return;
+  }
   const std::lock_guard guard(freeMutex);
   connection->nextFree = std::exchange(freeConnections, connection);
 }

@@ -14,6 +14,7 @@
 #include <memory>
 #include <vector>
 
+#include "shm/fork_guard.h"
 #include "shm/messages/message_link.h"
 
 namespace mpf {
@@ -35,6 +36,8 @@ struct Connection final : LinkUser {
   [[nodiscard]] Route routeOf(std::uint32_t requestId, RouteKeeper* keeper) noexcept {
     return {reinterpret_cast<std::uint64_t>(this), requestId, generation, keeper};
   }
+  // Whether this is a copy in a forked child: then its lock may be held for ever.
+  [[nodiscard]] bool isInherited() const noexcept { return forkGuard.isInherited(); }
   // Under lock: whether the client of this route is still connected.
   [[nodiscard]] bool isOpenFor(const Route& route) const noexcept {
     return generation == route.flags && channel;
@@ -63,6 +66,7 @@ struct Connection final : LinkUser {
     return requestId != 0 && owed(requestId).load(std::memory_order_relaxed) == requestId;
   }
 
+  ForkGuard forkGuard;
   std::shared_ptr<BiasedLock> lock = std::make_shared<BiasedLock>();
   std::shared_ptr<MessageLink> channel;  // under lock; empty: free
   std::uint32_t index = 0;  // of the link in the server's endpoint

@@ -57,7 +57,7 @@ RepliedMany MessageServer::replyBodies(const Message& request, MessageType type,
 }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
-  return core_->replies().allocate(request.route(), bytes);
+  return ReplySender::allocate(request.route(), bytes);
 }
 BodyBytes MessageServer::allocateShared(std::size_t bytes) {
   return core_->publisher().allocate(bytes);

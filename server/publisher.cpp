@@ -128,9 +128,9 @@ ReplyResult Publisher::relay(const Message& message, std::uint32_t missed) noexc
 
 ReplyResult Publisher::send(const Message& message, const Message& request,
                             const std::shared_ptr<FanOutChunk>& chunk, Missed missed) noexcept {
-  if (!message || request.route().link == 0 || forkGuard_.isInherited())
-    return ReplyResult::clientGone;
+  if (!message || request.route().link == 0) return ReplyResult::clientGone;
   auto& connection = Connection::of(request.route());
+  if (connection.isInherited()) return ReplyResult::clientGone;
   const BiasedLock::Guard lock(*connection.lock);
   return sendLocked(connection, message, request, chunk, missed);
 }

@@ -29,7 +29,7 @@ std::vector<std::uint32_t> RelayServer::owed(std::uint64_t client) const {
   return core_->connections().owed(client);
 }
 BodyBytes RelayServer::allocateBody(std::uint64_t client, std::size_t bytes) {
-  return core_->replies().allocate(core_->connections().routeTo(client, 0), bytes);
+  return ReplySender::allocate(core_->connections().routeTo(client, 0), bytes);
 }
 
 }  // namespace mpf

@@ -22,9 +22,9 @@ auto noteSent(Link& link) noexcept {
 }  // namespace
 
 ReplyResult ReplySender::send(Message& message) noexcept {
-  if (!message || message.route().link == 0 || forkGuard_.isInherited())
-    return ReplyResult::clientGone;
+  if (!message || message.route().link == 0) return ReplyResult::clientGone;
   auto& connection = Connection::of(message.route());
+  if (connection.isInherited()) return ReplyResult::clientGone;
   ReplyResult result{};
   {
     const BiasedLock::Guard lock(*connection.lock);
@@ -50,8 +50,9 @@ RepliedMany ReplySender::sendMany(std::span<Message> messages) noexcept {
 // that are counted, without the lock. The result is `clientGone` only if none was sent.
 RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const auto& route = messages.front().route();
-  if (route.link == 0 || forkGuard_.isInherited()) return {0, ReplyResult::clientGone};
+  if (route.link == 0) return {0, ReplyResult::clientGone};
   auto& connection = Connection::of(route);
+  if (connection.isInherited()) return {0, ReplyResult::clientGone};
   const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   auto& link = connection.channel->link();
@@ -85,8 +86,9 @@ RepliedMany ReplySender::sendBodies(const Message& request, const Bodies& bodies
 
 RepliedMany ReplySender::sendRun(const Message& request, const Bodies& bodies) noexcept {
   const auto& route = request.route();
-  if (route.link == 0 || forkGuard_.isInherited()) return {0, ReplyResult::clientGone};
+  if (route.link == 0) return {0, ReplyResult::clientGone};
   auto& connection = Connection::of(route);
+  if (connection.isInherited()) return {0, ReplyResult::clientGone};
   const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   const Link::Batch batch(connection.channel->link());
@@ -139,7 +141,7 @@ void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& req
 
 void ReplySender::sendRun(Connection& connection, std::uint32_t generation,
                           RequestRun& run) noexcept {
-  if (forkGuard_.isInherited()) return;
+  if (connection.isInherited()) return;
   std::size_t sent = 0;
   {
     const BiasedLock::Guard lock(*connection.lock);
@@ -180,7 +182,6 @@ std::size_t ReplySender::sendRunLocked(Connection& connection, RequestRun& run) 
 
 void ReplySender::refuse(Connection& connection, std::uint32_t generation, const RequestRun& run,
                          std::size_t index) noexcept {
-  if (forkGuard_.isInherited()) return;
   for (; index < run.size(); ++index)
     refuseAbandoned({reinterpret_cast<std::uint64_t>(&connection), run[index].requestId(),
                      generation, nullptr});
@@ -249,6 +250,7 @@ void ReplySender::sendFate(Connection& connection, RequestMarks request, Fate fa
 
 void ReplySender::refuseAbandoned(const Route& route) noexcept {
   auto& connection = Connection::of(route);
+  if (connection.isInherited()) return;
   const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(route) || !connection.owes(route.requestId)) return;
   Message message = RequestFateMessage({.fate = Fate::refused, .requestId = route.requestId});
@@ -257,8 +259,9 @@ void ReplySender::refuseAbandoned(const Route& route) noexcept {
 }
 
 BodyBytes ReplySender::tryAllocateInPool(const Route& route, std::size_t bytes) noexcept {
-  if (route.link == 0 || forkGuard_.isInherited()) return {};
+  if (route.link == 0) return {};
   auto& connection = Connection::of(route);
+  if (connection.isInherited()) return {};
   const BiasedLock::Guard lock(*connection.lock);
   return connection.isOpenFor(route) ? connection.channel->tryAllocateLocked(bytes) : BodyBytes{};
 }

@@ -41,11 +41,11 @@ class ReplySender {
   void refuseAbandoned(const Route& route) noexcept;
   // Allocates a body in the memory that is shared with the client of `route`, or on the heap.
   //   throws  std::bad_alloc
-  BodyBytes allocate(const Route& route, std::size_t bytes);
+  static BodyBytes allocate(const Route& route, std::size_t bytes);
 
  private:
   // Without data if the client has left, or its pool has no chunk.
-  BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
+  static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   RepliedMany sendRun(const Message& request, const Bodies& bodies) noexcept;
   std::size_t sendRunLocked(Connection& connection, RequestRun& run) noexcept;
@@ -57,7 +57,6 @@ class ReplySender {
   void noteServiceTime(Connection& connection) noexcept;
   ReplyResult noteRefused(LinkSend result) noexcept;
 
-  ForkGuard forkGuard_;
   ReplyCounts& counts_;
   const bool stamps_;
 };

@@ -49,7 +49,11 @@ namespace mpf {
 
 struct ServerOptions {
   std::int32_t location = Backplane::defaultLocation();
-  int queueSize = 100;  // requests of one client that may wait, 1 to 16384
+  // Requests of one client that may wait, 1 to 16384; twice as many may have no reply yet. Bodies of
+  // up to 24 bytes, such as those of Int32, always have room, as requests and as first replies.
+  // Longer ones need several slots of the queue or one of 256 chunks of memory: with a queueSize of
+  // 369 or more, the last of the longer messages may be refused with noMemory.
+  int queueSize = 100;
   std::uint64_t maxMessageBytes = 64ull << 20;  // [bytes] largest body of a request or a reply
   std::uint64_t maxPoolBytes = 320ull << 20;  // [bytes] of large messages, per client and direction
   WaitMode waitMode = WaitMode::adaptive;  // how waitForMessage() waits
@@ -212,6 +216,8 @@ class MessageServer {
 
   // Sets the handler that run() and handleOne() call for requests of type T. A handler may set
   // another in its own place. What it gets depends on its parameter:
+  //
+  // If there is no memory for a reply, the request ends as `refused`.
   //
   //   T&               the fields of one request, which is then sent as the reply
   //   MessageOf<T>&    one request as a handle, which is then sent as the reply

@@ -141,11 +141,11 @@ TEST_F(ReplySenderTest, ALargeBodyIsInThePoolWhileTheClientIsConnected) {
   const auto route = owe(connection_, 3);
   const auto release = [](BodyBytes body) { body.lender->takeBack(body.data, body.capacity); };
 
-  const auto shared = replies_.allocate(route, 10'000);
+  const auto shared = ReplySender::allocate(route, 10'000);
   EXPECT_EQ(shared.lender, connection_.channel.get());
   release(shared);
   connections_.close(connection_);
-  const auto heap = replies_.allocate(route, 10'000);
+  const auto heap = ReplySender::allocate(route, 10'000);
 
   EXPECT_NE(heap.lender, shared.lender);
   release(heap);

@@ -63,7 +63,7 @@ TEST_F(RequestKeeperTest, WaitsForNoLockInTheChildOfAFork) {
     const BiasedLock::Guard lock(*connection_.lock);  // never released in the child
     const auto status = endOf([&] {
       ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-      const auto body = replies_.allocate(inherited.route(), 10'000);
+      const auto body = ReplySender::allocate(inherited.route(), 10'000);
       EXPECT_EQ(body.lender, &heapLender());
       body.lender->takeBack(body.data, body.capacity);
       inherited.reset();

@@ -105,6 +105,29 @@ TEST_F(ForkTest, AChildThatDestroysObjectsDoesNotChangeTheParents) {
   expectAnswer(*sync_);
 }
 
+TEST_F(ForkTest, AChildCannotReplyToARequestOfItsParent) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some";
+#endif
+  MessageServer server(backplane_, "parent");
+  SyncClient client(backplane_, "parent");
+  std::thread calling([&] { EXPECT_TRUE(client.call(Float64Message({.value = 1}), 60s)); });
+  Message request;
+  while (!(request = server.receive())) server.waitForMessage(Deadline::after(1ms));
+
+  const auto status = inChild([&] {
+    MessageServer own(backplane_, "child");
+    auto reply = own.allocReplyMessage<Float64Array>(request, 1000);
+    EXPECT_EQ(own.reply(std::move(reply)), ReplyResult::clientGone);
+    const std::vector<Float64> values(3);
+    EXPECT_EQ(own.replyMany<Float64>(request, values).count, 0u);
+  });
+
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent);
+  calling.join();
+}
+
 TEST_F(ForkTest, AChildMayCreateItsOwnObjects) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some";
