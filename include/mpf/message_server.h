@@ -49,8 +49,8 @@ namespace mpf {
 
 struct ServerOptions {
   std::int32_t location = Backplane::defaultLocation();
-  // Requests of one client that may wait, 1 to 16384; twice as many may have no reply yet. Bodies of
-  // up to 24 bytes, such as those of Int32, always have room, as requests and as first replies.
+  // Requests of one client that may wait, 1 to 16384; twice as many may have no reply yet. Bodies
+  // of up to 24 bytes, such as those of Int32, always have room, as requests and as first replies.
   // Longer ones need several slots of the queue or one of 256 chunks of memory: with a queueSize of
   // 369 or more, the last of the longer messages may be refused with noMemory.
   int queueSize = 100;
@@ -215,9 +215,8 @@ class MessageServer {
   }
 
   // Sets the handler that run() and handleOne() call for requests of type T. A handler may set
-  // another in its own place. What it gets depends on its parameter:
-  //
-  // If there is no memory for a reply, the request ends as `refused`.
+  // another in its own place. If there is no memory for a reply, the request ends as `refused`.
+  // What a handler gets depends on its parameter:
   //
   //   T&               the fields of one request, which is then sent as the reply
   //   MessageOf<T>&    one request as a handle, which is then sent as the reply
