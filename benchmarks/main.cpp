@@ -36,7 +36,7 @@ int runPython(const std::vector<std::string>& arguments) {
 }
 
 int bench(int argc, char** argv) {
-  CLI::App app("mpf bench - measures messages beside the physical floors and other message systems",
+  CLI::App app("mpf bench - measures messages beside the hardware limits and other message systems",
                "mpf bench");
   auto& local = *app.add_subcommand("local", mpf::bench::kLocalHelp);
   auto& remote = *app.add_subcommand("remote", mpf::bench::kRemoteHelp);

@@ -124,8 +124,7 @@ bool Router::tryMakeRoom() {
   });
   context_.log.warn(
       "{} connections (max-connections), {} of them from {} without a greeting: closing the oldest "
-      "of "
-      "these",
+      "of these",
       sessions_.size(), most, victim->host);
   std::exchange(victim->end, nullptr)->fulfill();
   return true;

@@ -25,7 +25,7 @@ class HotLinks {
   static constexpr std::uint32_t kReplaceAfter = 64;
 
   // Polls with a message before the peer may send without a fence. The end of polling then costs a
-  // barrier in all processes (15 us), so a link that sleeps after each message never gets there.
+  // barrier in all processes (15 us), so a link that sleeps after each message never reaches it.
   static constexpr std::uint32_t kUnfencedAfter = 1024;
 
   //   pollsInWaits   whether the owner polls while it waits; otherwise it sleeps at once

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf bench local`: measures MPF beside the physical floors and beside other message systems, in
+// `mpf bench local`: measures MPF beside the hardware limits and beside other message systems, in
 // one run on two CPUs.
 //
 //   mpf::bench::Options options;
@@ -12,7 +12,7 @@
 namespace mpf::bench {
 
 inline constexpr const char* kLocalHelp =
-    "Measures messages on this host, beside the physical floors and other message systems";
+    "Measures messages on this host, beside the hardware limits and other message systems";
 
 // Returns the exit status of the program: 0 all rows were measured or left out with a reason, 1 a
 // row failed, 2 usage error.

@@ -99,7 +99,7 @@ int show(const std::vector<Result>& results, const Machine& machine, const Place
 
 void addOptions(CLI::App& app, Options& options) {
   app.add_flag("--quick", options.quick,
-               "Shorter, and so noisier, measurements: end within 40 s, local within 90 s");
+               "Shorter and noisier measurements: at most 40 s, local 90 s");
   app.add_flag("--list", options.list, "Only list the rows that would be measured");
   app.add_option(
       "--json", options.jsonFile,

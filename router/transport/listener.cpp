@@ -141,9 +141,8 @@ kj::Promise<void> Listener::handshake(kj::AuthenticatedStream caller, const std:
 
 kj::Promise<void> Listener::openTls(kj::AuthenticatedStream caller, kj::byte first,
                                     const std::string& address) {
-  if (first == kFrameByte)
-    refusedPeers_.add(kj::mv(caller.stream), FarewellCode::PROTOCOL, kExpectsTls);
   if (first == kFrameByte) {
+    refusedPeers_.add(kj::mv(caller.stream), FarewellCode::PROTOCOL, kExpectsTls);
     return KJ_EXCEPTION(FAILED,
                         "the caller uses plain TCP, and this port expects TLS: set the same "
                         "security at both routers");

@@ -90,7 +90,7 @@ class MessageLink final : public BodyLender {
   MessageLink(std::unique_ptr<Link> link, std::shared_ptr<BiasedLock> lock)
       : link_(std::move(link)), lock_(std::move(lock)) {}
   ~MessageLink() = default;
-  // The end of the last pointer.
+  // The last pointer is gone.
   void leave() noexcept;
   [[nodiscard]] static bool hasType(BodyFields body) noexcept {
     return body.type != static_cast<std::uint16_t>(MessageType::none);

@@ -100,7 +100,9 @@ class DevMpf {
   virtual void connectIO(dbCommon* record, const Connect& connect);
   // Called with an OutOfBand message. The default logs it.
   virtual void outOfBandIO(dbCommon* record, Message&& message);
-  // Called by ai and ao records when fields of the linear conversion change.
+  // Called by ai and ao records when fields of the linear conversion change (special_linconv).
+  //   pass     0 before the change, 1 after it
+  //   returns  0, or a status of EPICS that refuses the change
   virtual long convert(dbCommon* record, int pass);
 
   // Sends a message to the server.

@@ -65,7 +65,7 @@ void Ti9914Options::addTo(CLI::App& app) {
   addWords(
       app, "--meter", "ADDRESS[,WIRE]",
       "On a carrier of models: a voltmeter like the HP 3458A, which measures a wire of --wires; "
-      "default: one at 22, with readings of its own",
+      "default: one at 22, with simulated values",
       [this](OptionFields& words) { meters.push_back(readMeter(words)); });
 }
 

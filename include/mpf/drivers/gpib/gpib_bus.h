@@ -49,7 +49,7 @@ struct GpibBusOptions {
 // A user of the bus. Operations with the id of the lease's holder pass; 0 is nobody's id.
 using GpibUser = std::uint64_t;
 
-// How a lease ended or how it stands.
+// The present holder of the lease.
 struct GpibLeaseHolder {
   GpibUser user = 0;
   std::string name;
@@ -72,7 +72,7 @@ class GpibBus {
 
   // Operations. `deadline` holds for the wait and the operation together.
   // After a write that failed, the instrument may hold a part of the data: clear() removes it.
-  //   user  who asks; matters only while the bus is leased
+  //   user  the caller; used only while the bus is leased
   GpibResult write(const GpibAddress& to, Bytes data, Deadline deadline, GpibUser user = 0,
                    bool sendEnd = true);
   GpibReadResult read(const GpibAddress& from, const GpibReadLimits& limits, Deadline deadline,
@@ -97,13 +97,13 @@ class GpibBus {
   //   limit     longest time of the lease
   //   deadline  for the wait for another holder
   GpibResult lease(GpibUser user, std::string name, Milliseconds limit, Deadline deadline);
-  // Ends the lease of `user`; an operation of it that is in progress ends first. Does nothing when
-  // `user` does not hold the bus. Never blocks.
+  // Ends the lease of `user`, after its operation in progress. Does nothing when `user` does not
+  // hold the bus. Does not wait.
   void release(GpibUser user) noexcept;
   [[nodiscard]] std::optional<GpibLeaseHolder> leaseHolder() const;
 
-  // A subscription ends when its object is destroyed; the handler does not run afterwards. Both
-  // objects must be destroyed before the bus. Move-only.
+  // A subscription ends when its object is destroyed; the handler does not run afterwards. It
+  // must be destroyed before the bus. Move-only.
   class Subscription {
    public:
     Subscription() noexcept = default;
@@ -117,7 +117,8 @@ class GpibBus {
     std::shared_ptr<void> entry_;
   };
   // Calls `handler` each time when the SRQ line has become active, and again every
-  // pollServiceRequestEvery while it stays active. The handler usually does serialPoll().
+  // pollServiceRequestEvery while it stays active. The handler usually does serialPoll(). It
+  // must not throw.
   [[nodiscard]] Subscription onServiceRequest(std::function<void()> handler);
   // Shows every byte of the bus to `handler`, with its ATN, EOI and direction.
   [[nodiscard]] Subscription attachTap(GpibPeekHandler handler);

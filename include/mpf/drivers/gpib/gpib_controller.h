@@ -63,16 +63,16 @@ class GpibController {
   // Whether an instrument holds the SRQ line now. Empty: the controller could not tell.
   [[nodiscard]] virtual std::optional<bool> requestsService(Deadline deadline) = 0;
 
-  // Calls `handler` soon after the SRQ line has become active. Empty: nobody is called any more;
-  // the former handler does not run after return.
+  // Calls `handler` soon after the SRQ line has become active. Empty: removes the handler, which
+  // does not run after return.
   //   returns  whether the controller reports service requests by itself; when it does not, GpibBus
   //            asks requestsService() periodically
   virtual bool onServiceRequest(std::function<void()> handler) = 0;
-  // Shows the bytes of the bus to `handler`; empty: to nobody. To be called between operations. A
+  // Shows the bytes of the bus to `handler`; empty: removes it. To be called between operations. A
   // controller that sees no commands (Prologix, USBTMC) shows the data only.
   virtual void onPeek(GpibPeekHandler handler) = 0;
 
-  // For messages to people: the kind and the device, as "TI9914 a-ip488 at carrier 0 slot 1".
+  // For messages to people: the kind and the device, as "TI9914 a-ip488 (carrier ipac, site IP_a)".
   [[nodiscard]] virtual std::string description() const = 0;
 };
 

@@ -32,9 +32,11 @@
 namespace mpf {
 
 struct UsbtmcOptions {
-  std::string device;
+  std::string device;  // the path of the device, such as /dev/usbtmc0
 };
 
+// Returns the controller. The first operation opens the device, and fails if it is absent.
+//   throws  std::bad_alloc
 [[nodiscard]] std::unique_ptr<GpibController> openUsbtmc(const UsbtmcOptions& options);
 
 }  // namespace mpf

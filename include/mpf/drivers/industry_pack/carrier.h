@@ -67,11 +67,14 @@ class IndustryPackCarrier {
 // The carriers of a program, by name.
 class IndustryPackCarriers {
  public:
-  //   throws  IndustryPackError tooMany above 21 carriers; std::invalid_argument when the name is
-  //           empty or in use
+  //   carrier  not null; exists as long as this object
+  //   throws   IndustryPackError tooMany above 21 carriers; std::invalid_argument when the name is
+  //            empty or in use
   void add(const std::string& name, std::unique_ptr<IndustryPackCarrier> carrier);
   //   throws  std::invalid_argument, which lists the existing names
   [[nodiscard]] IndustryPackCarrier& find(const std::string& name) const;
+  //   throws  std::invalid_argument when there is no such carrier or site; as
+  //           IndustryPackCarrier::site()
   [[nodiscard]] IndustryPackSite& site(const std::string& carrierName,
                                        const std::string& siteName) const;
   [[nodiscard]] std::vector<std::string> names() const;

@@ -41,6 +41,8 @@ struct ModelWiresFile;  // the layout of the file
 // One wire. Valid as long as its ModelWires.
 class ModelWire {
  public:
+  // The value, in the unit on which the models at the wire agree: V for analog signals, 0 and 1 for
+  // digital ones. Any thread.
   [[nodiscard]] double get() const noexcept {
     return std::bit_cast<double>(value_->load(std::memory_order_relaxed));
   }
@@ -86,7 +88,9 @@ class ModelWires {
 // report several changes.
 class ModelWireWatcher {
  public:
-  // `wires` must outlive this object.
+  //   wires    outlives this object
+  //   changed  must not throw, and must not destroy this object
+  //   throws   std::system_error when no thread can be started
   ModelWireWatcher(ModelWires& wires, std::function<void()> changed);
   // The function does not run after return.
   ~ModelWireWatcher();

@@ -9,7 +9,7 @@
 // possible, not only those that have a constant in termios.
 //
 // When the device is unplugged, the state of the port is `unplugged`, and requests fail at once.
-// The port tries to open the same path again, first after 20 ms, at last once a second, and
+// The port tries to open the same path again, first after 20 ms, later once a second, and
 // applies the settings that were in force.
 //
 // Threads  each port has a thread of its own; see SerialPort.
@@ -29,7 +29,7 @@ struct PosixTerminalOptions {
   // in at another place.
   std::string device;
   // A field that is 0 keeps the setting that the device has.
-  SerialSettings settings = {};  // NOLINT(readability-redundant-member-init): g++ wants it
+  SerialSettings settings = {};  // NOLINT(readability-redundant-member-init): g++ needs it
   // What to do when the device cannot be opened. true: openPosixTerminal() returns at once, and the
   // port is unplugged until an attempt succeeds. false: openPosixTerminal() throws.
   bool waitForDevice = false;

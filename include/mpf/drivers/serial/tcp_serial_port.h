@@ -9,7 +9,7 @@
 // and sendBreak() fails.
 //
 // A lost connection is an unplug: requests fail at once. The port connects again, first after
-// 20 ms, at last once a second, and looks up the name each time. A terminal server that vanishes
+// 20 ms, later once a second, and looks up the name each time. A terminal server that vanishes
 // without closing the connection is detected within about 30 s.
 //
 // Threads  each port has a thread of its own, and one more while a name is looked up; see
