@@ -139,9 +139,10 @@ class DevMpf::Impl final : public SharedClient::Member,
   }
   long send(Message&& message, ReplyType reply) {
     const auto deadline = timeout_.count() == 0 ? Deadline::never() : Deadline::after(timeout_);
-    requestId_.store(0, std::memory_order_relaxed);
+    auto& requestId = reply == replyTypeCompleteIO ? requestId_ : otherRequestId_;
+    requestId.store(0, std::memory_order_relaxed);
     const auto result =
-        connection_ ? connection_->send(member_, reply, std::move(message), deadline, requestId_)
+        connection_ ? connection_->send(member_, reply, std::move(message), deadline, requestId)
                     : SendResult::notConnected;
     if (result == SendResult::notConnected) return failDisconnected();
     if (result != SendResult::sent) return device_.fail(record_, toString(result));
@@ -231,7 +232,8 @@ class DevMpf::Impl final : public SharedClient::Member,
   std::optional<Message> reply_;  // the message that the record processes now
   RecordQueue queue_;
   CallbackQueue& callbacks_ = IocClients::instance().callbacks(record_->prio);
-  std::atomic<std::uint32_t> requestId_{0};
+  std::atomic<std::uint32_t> requestId_{0};  // of the request that completes the I/O
+  std::atomic<std::uint32_t> otherRequestId_{0};
   std::atomic<std::int64_t> deadlineNs_{0};  // of the outstanding request; 0: none
 };
 

@@ -84,14 +84,14 @@ void IocClients::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     try {
       if (dispatcher_->runOnce(nextTick)) static_cast<void>(dispatcher_->runPending(kBatches));
+      if (nextTick.hasPassed()) {
+        nextTick = Deadline::after(kTick);
+        tick();
+      }
+      flush();
     } catch (const std::exception& error) {  // no memory for a message
       errlogPrintf("MPF: a message is lost: %s\n", error.what());
     }
-    if (nextTick.hasPassed()) {
-      tick();
-      nextTick = Deadline::after(kTick);
-    }
-    flush();
   }
 }
 

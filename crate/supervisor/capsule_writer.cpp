@@ -35,31 +35,39 @@ void CapsuleWriter::watch(const Service& service) {
   witness.watch(service.pid(), service.startTicks());
 }
 
-std::string CapsuleWriter::collect(const Service& service, const ProcessEnd& end) try {
+void CapsuleWriter::forget(const Service& service) {
+  const auto found = witnesses_.find(service.plan().backplane);
+  if (found != witnesses_.end()) found->second.forget(service.pid());
+}
+
+std::string CapsuleWriter::collect(const Service& service, const ProcessEnd& end) {
+  std::string path;
+  try {
+    if (service.endReason() != EndReason::stopRequest) path = write(service, end);
+  } catch (const std::exception& error) {
+    printError("mpf run: {}: no capsule: {}\n", service.plan().name, error.what());
+  }
+  forget(service);
+  return path;
+}
+
+// Returns the path of the capsule; empty if the process is no longer in the crate.
+std::string CapsuleWriter::write(const Service& service, const ProcessEnd& end) {
   const auto& plan = service.plan();
   const auto found = witnesses_.find(plan.backplane);
   if (found == witnesses_.end()) return {};
-  auto& witness = found->second;
-  std::string path;
-  if (service.endReason() != EndReason::stopRequest) {
-    Death death;
-    death.crate = crate_;
-    death.process = plan.name;
-    death.command = plan.command;
-    death.pid = service.pid();
-    death.startedNs = service.startedNs();
-    death.restarts = service.restarts();
-    death.cause = causeOf(service, end);
-    death.log = folder_.log(plan.name);
-    death.folder =
-        plan.workingFolder.empty() ? std::filesystem::current_path().string() : plan.workingFolder;
-    path = store_.add(capsuleOf(death, witness.find(service.pid())));
-  }
-  witness.forget(service.pid());
-  return path;
-} catch (const std::exception& error) {
-  printError("mpf run: {}: no capsule: {}\n", service.plan().name, error.what());
-  return {};
+  Death death;
+  death.crate = crate_;
+  death.process = plan.name;
+  death.command = plan.command;
+  death.pid = service.pid();
+  death.startedNs = service.startedNs();
+  death.restarts = service.restarts();
+  death.cause = causeOf(service, end);
+  death.log = folder_.log(plan.name);
+  death.folder =
+      plan.workingFolder.empty() ? std::filesystem::current_path().string() : plan.workingFolder;
+  return store_.add(capsuleOf(death, found->second.find(service.pid())));
 }
 
 }  // namespace mpf::crate

@@ -33,12 +33,15 @@ class CapsuleWriter {
   void look();
   // Call when a process has been started or taken over.
   void watch(const Service& service);
+  void forget(const Service& service);
   // Call when the process of `service` has ended, before Service::ended() and before its files are
   // removed. Returns the path of the capsule; empty: its stop was requested, or the capsule could
   // not be written, which has been reported.
   std::string collect(const Service& service, const ProcessEnd& end);
 
  private:
+  std::string write(const Service& service, const ProcessEnd& end);
+
   CrateFolder folder_;
   std::string crate_;
   CapsuleStore store_;

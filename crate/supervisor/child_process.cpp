@@ -88,6 +88,7 @@ bool becomeUser(const User& user) {
   sigset_t none;
   ::sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
+  ::signal(SIGPIPE, SIG_DFL);  // the supervisor ignores it
   ::setpgid(0, 0);  // Ctrl-C reaches the supervisor only, which stops everything in order
   char opened = 0;
   if (retryInterrupted([&] { return ::read(gate, &opened, 1); }) != 1) ::_exit(0);

@@ -10,12 +10,16 @@
 #include <cctype>
 #include <fmt/format.h>
 #include <functional>
+#include <utility>
 
 #include "base/printable.h"
 #include "base/system_call.h"
 
 namespace mpf::crate {
 namespace {
+
+constexpr std::int64_t kMostAtOnce = std::int64_t{1} << 20;
+constexpr std::size_t kLongestLine = std::size_t{64} << 10;
 
 // Digits are what differs between the lines of a storm: times, counts, addresses.
 std::string withoutNumbers(const std::string& line) {
@@ -53,17 +57,19 @@ LogFollower::LogFollower(bool hasColour, std::uint64_t maxBytes)
 
 void LogFollower::add(const std::string& name, const std::string& path) {
   if (logs_.contains(name)) return;
-  auto& log = logs_[name];
+  Log log;
   log.path = path;
   log.file = FileDescriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
   log.offset = ::lseek(log.file.get(), 0, SEEK_END);
   checkCall(::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
+  logs_.emplace(name, std::move(log));
 }
 
 std::string LogFollower::takeLines() {
   std::array<char, 4096> events{};
   while (::read(events_.get(), events.data(), events.size()) > 0) continue;
   std::string text;
+  hasMore_ = false;
   for (auto& [name, log] : logs_) {
     readNew(name, log, text);
     limit(log);
@@ -77,27 +83,39 @@ std::string LogFollower::prefix(const std::string& name) const {
   return fmt::format("\x1b[{}m{}\x1b[0m | ", colour, name);
 }
 
-void LogFollower::readNew(const std::string& name, Log& log, std::string& to) const {
+void LogFollower::readNew(const std::string& name, Log& log, std::string& to) {
   std::array<char, 65536> bytes{};
   struct stat status{};
   if (::fstat(log.file.get(), &status) == 0 && status.st_size < log.offset) log.offset = 0;
-  for (;;) {
+  const auto enough = log.offset + kMostAtOnce;
+  while (log.offset < enough) {
     const auto length = ::pread(log.file.get(), bytes.data(), bytes.size(), log.offset);
     if (length <= 0) break;
     log.offset += length;
     log.partial.append(bytes.data(), static_cast<std::size_t>(length));
   }
-  std::string folded;
-  for (auto end = log.partial.find('\n'); end != std::string::npos; end = log.partial.find('\n')) {
-    folded += log.folder.fold(printable(log.partial.substr(0, end)));
-    log.partial.erase(0, end + 1);
-  }
-  folded += log.folder.finish();
+  hasMore_ = hasMore_ || log.offset >= enough;
+  const auto folded = takeWhole(log);
   for (std::size_t begin = 0; begin < folded.size();) {
     const auto end = folded.find('\n', begin);
     to += prefix(name) + folded.substr(begin, end - begin + 1);
     begin = end + 1;
   }
+}
+
+// Takes the lines that have an end, and a part of one that is very long.
+std::string LogFollower::takeWhole(Log& log) {
+  std::string folded;
+  std::size_t begin = 0;
+  for (auto end = log.partial.find('\n'); end != std::string::npos;
+       end = log.partial.find('\n', begin)) {
+    folded += log.folder.fold(printable(log.partial.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  log.partial.erase(0, begin);
+  if (log.partial.size() > kLongestLine)
+    folded += log.folder.fold(printable(std::exchange(log.partial, {})));
+  return folded + log.folder.finish();
 }
 
 // Removes the first half of a log that is too long. The file system removes it as a whole, so no

@@ -45,8 +45,10 @@ class LogFollower {
   void add(const std::string& name, const std::string& path);
   // Readable when a log has grown.
   [[nodiscard]] int descriptor() const noexcept { return events_.get(); }
-  // Returns all new lines.
+  // Returns new lines, at most about a megabyte of each log; hasMore() tells whether others follow.
+  // A line that is longer than 64 KiB comes in parts.
   [[nodiscard]] std::string takeLines();
+  [[nodiscard]] bool hasMore() const noexcept { return hasMore_; }
 
  private:
   struct Log {
@@ -56,7 +58,8 @@ class LogFollower {
     std::string partial;  // a line without its end
     LineFolder folder;
   };
-  void readNew(const std::string& name, Log& log, std::string& to) const;
+  void readNew(const std::string& name, Log& log, std::string& to);
+  static std::string takeWhole(Log& log);
   void limit(Log& log) const;
   [[nodiscard]] std::string prefix(const std::string& name) const;
 
@@ -64,6 +67,7 @@ class LogFollower {
   std::uint64_t maxBytes_;
   FileDescriptor events_;  // inotify
   std::map<std::string, Log> logs_;
+  bool hasMore_ = false;
 };
 
 }  // namespace mpf::crate

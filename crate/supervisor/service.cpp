@@ -68,6 +68,8 @@ void Service::adopted(pid_t pid, std::uint64_t startTicks, int restarts, std::in
 }
 
 void Service::startFailed(const std::string& why, std::int64_t nowNs) {
+  pid_ = 0;  // the end of a child that was started is no further failure
+  startTicks_ = 0;
   reason_ = why;
   plan(nowNs);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "crate/supervisor/supervisor.h"
 
+#include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,7 +16,6 @@
 #include "base/service_manager.h"
 #include "base/system_call.h"
 #include "crate/supervisor/child_process.h"
-#include "crate/supervisor/service_json.h"
 
 namespace mpf::crate {
 namespace {
@@ -36,6 +36,7 @@ Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
       crate_(load_()),
       logs_(::isatty(STDERR_FILENO) != 0, crate_.maxLogBytes),
       capsuleWriter_(folder_, crate_) {
+  ::signal(SIGPIPE, SIG_IGN);  // stderr may be a pipe whose reader Ctrl-C has ended
   folder_.create();
   lock_ = folder_.lock();
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // reaps what the processes leave behind
@@ -51,8 +52,9 @@ void Supervisor::run() {
     reportStatus();
     wait();
   }
-  record();
-  writeError(logs_.takeLines());
+  tryRecord();
+  do writeError(logs_.takeLines());
+  while (logs_.hasMore());
   ::unlink(folder_.file("control").c_str());
 }
 
@@ -61,9 +63,13 @@ void Supervisor::run() {
 void Supervisor::takeOver() {
   for (const auto& recorded : CrateState::read(folder_.file("state.json")).processes) {
     auto* member = find(recorded.name);
-    if (member != nullptr && recorded.isStopRequested) member->service.requestStop(Clock::nowNs());
     auto pidfd = openPidfd(recorded.pid);
-    if (pidfd.get() < 0 || startTicksOf(recorded.pid) != recorded.startTicks) continue;
+    const bool isAlive = pidfd.get() >= 0 && startTicksOf(recorded.pid) == recorded.startTicks;
+    if (!isAlive && (member == nullptr || !recorded.isStopRequested)) continue;
+    if (!isAlive) {
+      member->service.requestStop(Clock::nowNs());
+      continue;
+    }
     if (member == nullptr) {
       ProcessPlan plan;
       plan.name = recorded.name;
@@ -77,13 +83,17 @@ void Supervisor::takeOver() {
                     startNsOf(recorded.startTicks));
     capsuleWriter_.watch(service);
     log(service, fmt::format("taken over, pid {}", recorded.pid));
-    if (member->isRemoved) service.requestStop(Clock::nowNs());
+    if (member->isRemoved || recorded.isStopRequested) service.requestStop(Clock::nowNs());
     else if (recorded.command != shellText(service.plan())) service.requestRestart(Clock::nowNs());
   }
 }
 
 // Takes these plans in place of the present ones. Processes whose plans are unchanged continue.
 void Supervisor::apply(const std::vector<ProcessPlan>& plans) {
+  for (const auto& plan : plans) {  // first what may fail: then nothing has changed
+    logs_.add(plan.name, folder_.log(plan.name));
+    watches_.try_emplace(plan.backplane, plan.backplane);
+  }
   std::vector<std::unique_ptr<Member>> fresh;
   for (const auto& plan : plans) {
     const auto found = std::ranges::find_if(members_, [&](const auto& member) {
@@ -91,8 +101,6 @@ void Supervisor::apply(const std::vector<ProcessPlan>& plans) {
     });
     if (found != members_.end()) fresh.push_back(std::move(*found));
     else fresh.push_back(std::make_unique<Member>(plan));
-    logs_.add(plan.name, folder_.log(plan.name));
-    watches_.try_emplace(plan.backplane, plan.backplane);
   }
   // The others end. Those that are replaced are first in the list, so that their successors wait.
   for (auto& member : members_) {
@@ -106,8 +114,9 @@ void Supervisor::apply(const std::vector<ProcessPlan>& plans) {
 
 void Supervisor::reload() try {
   ServiceManager::notifyReloading();
-  crate_ = load_();
-  apply(planProcesses(crate_, folder_.path().string()));
+  auto fresh = load_();
+  apply(planProcesses(fresh, folder_.path().string()));
+  crate_ = std::move(fresh);
   printError("mpf run: reloaded {}\n", crate_.file);
   ServiceManager::notifyReady();
 } catch (...) {
@@ -189,6 +198,7 @@ void Supervisor::start(Member& member) {
       throw std::runtime_error(
           fmt::format("{} in {}: {}", plan.command.front(), plan.workingFolder, why));
   } catch (const std::exception& error) {
+    capsuleWriter_.forget(service);  // its child, if there is one, ends by itself
     service.startFailed(fmt::format("cannot be started: {}", error.what()), Clock::nowNs());
     log(service, service.reason());
   }
@@ -239,11 +249,13 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   const auto pid = service.pid();
   const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
   member.adopted.reset();
-  capsuleWriter_.look();
+  attempt([&] { capsuleWriter_.look(); });
   const auto capsule = capsuleWriter_.collect(service, end);
   service.ended(end, Clock::nowNs());
-  record();
-  for (const auto& [backplane, watch] : watches_) watch.removeFilesOfDead();
+  tryRecord();
+  attempt([&] {
+    for (const auto& [backplane, watch] : watches_) watch.removeFilesOfDead();
+  });
   const auto next = service.state() == ServiceState::pausing
                         ? fmt::format("restart {}", service.restarts())
                         : std::string(toString(service.state()));
@@ -256,8 +268,11 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
 
 // Finds out which processes are ready, and which are stalled.
 void Supervisor::look() {
-  for (auto& [backplane, watch] : watches_) watch.look();
-  capsuleWriter_.look();
+  attempt([&] {
+    for (auto& [backplane, watch] : watches_) watch.look();
+    capsuleWriter_.look();
+  });
+  if (!isRecorded_) tryRecord();
   const auto now = Clock::nowNs();
   for (const auto& member : members_) {
     auto& service = member->service;
@@ -295,51 +310,29 @@ void Supervisor::record() const {
   state.file = crate_.file;
   for (const auto& member : members_) {
     const auto& service = member->service;
-    state.processes.push_back({service.plan().name, service.pid(), service.startTicks(),
-                               service.restarts(), shellText(service.plan()),
-                               service.isStopRequested() && !isShuttingDown_});
+    state.processes.push_back(
+        {service.plan().name, service.pid(), service.startTicks(), service.restarts(),
+         shellText(service.plan()),
+         service.isStopRequested() && !isShuttingDown_ && !member->isRemoved});
   }
   state.write(folder_.file("state.json"));
 }
 
-nlohmann::json Supervisor::answer(const nlohmann::json& request) {
-  const std::string what = request.at("do");
-  const auto now = Clock::nowNs();
-  if (what == "ps") return describe();
-  if (what == "reload") reload();
-  else if (what == "shutdown") beginShutdown();
-  else if (what == "stop") memberOf(request).service.requestStop(now);
-  else if (what == "start") memberOf(request).service.requestStart();
-  else if (what == "restart") memberOf(request).service.requestRestart(now);
-  else throw std::runtime_error(fmt::format("unknown request \"{}\"", what));
-  record();
-  return nlohmann::json::object();
-}
-
-// The member that a request names.
-Supervisor::Member& Supervisor::memberOf(const nlohmann::json& request) {
-  const std::string name = request.at("name");
-  if (auto* const member = find(name)) return *member;
-  std::string names;
-  for (const auto& one : members_) names += (names.empty() ? "" : ", ") + one->service.plan().name;
-  throw std::runtime_error(fmt::format("the crate has no process \"{}\"; it has {}", name, names));
-}
-
-nlohmann::json Supervisor::describe() const {
-  auto processes = nlohmann::json::array();
-  for (const auto& member : members_) {
-    auto one = toJson(member->service);
-    one["log"] = folder_.log(member->service.plan().name);
-    processes.push_back(std::move(one));
+void Supervisor::noteProblem(std::string_view what) noexcept {
+  if (what == problem_) return;
+  printError("mpf run: {}\n", what);
+  try {
+    problem_ = what;
+  } catch (const std::bad_alloc&) {  // then it is reported again
   }
-  return {{"crate", crate_.name},
-          {"file", crate_.file},
-          {"folder", folder_.path().string()},
-          {"pid", ::getpid()},
-          {"processes", processes}};
+}
+
+void Supervisor::tryRecord() {
+  isRecorded_ = attempt([&] { record(); });
 }
 
 int Supervisor::waitMs() const {
+  if (logs_.hasMore()) return 0;
   auto next = nextLookNs_;
   for (const auto& member : members_) {
     if (const auto time = member->service.nextActionNs()) next = std::min(next, *time);
@@ -371,11 +364,11 @@ void Supervisor::wait() {
     if (polled[firstAdopted + i].revents != 0) handleEnd(*adopted[i], {});
   if (polled[0].revents != 0) handleSignals();
   control_.handle({polled.begin() + firstControl, polled.end()});
-  if (polled[1].revents != 0) writeError(logs_.takeLines());
+  if (polled[1].revents != 0 || logs_.hasMore()) writeError(logs_.takeLines());
   if (polled[2].revents != 0) takeReports();
   if (std::any_of(polled.begin() + firstWitness, polled.begin() + firstControl,
                   [](const pollfd& one) { return one.revents != 0; }))
-    capsuleWriter_.look();
+    attempt([&] { capsuleWriter_.look(); });
   if (Clock::nowNs() >= nextLookNs_) look();
 }
 

@@ -67,6 +67,19 @@ class Supervisor {
   [[nodiscard]] bool isReady(const Member& member) const;
   void takeReports();
   void record() const;
+  void tryRecord();  // again at the next look, if it fails
+  // Does what may fail, for example without a free descriptor, and must not end the supervision.
+  // Returns whether it was done; reports a failure once.
+  template <class Act>
+  bool attempt(const Act& act) noexcept try {
+    act();
+    problem_.clear();
+    return true;
+  } catch (const std::exception& error) {
+    noteProblem(error.what());
+    return false;
+  }
+  void noteProblem(std::string_view what) noexcept;
   nlohmann::json answer(const nlohmann::json& request);
   [[nodiscard]] nlohmann::json describe() const;
   void wait();
@@ -91,6 +104,8 @@ class Supervisor {
   ControlServer control_{[this](const auto& request) { return answer(request); }};
   std::int64_t nextLookNs_ = 0;
   std::string status_;  // as last reported to systemd
+  std::string problem_;  // the failure that was reported last
+  bool isRecorded_ = true;  // the file has the present state
   bool isShuttingDown_ = false;
 };
 

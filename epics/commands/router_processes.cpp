@@ -6,6 +6,7 @@
 #include <epicsExit.h>
 #include <errlog.h>
 #include <fmt/format.h>
+#include <system_error>
 
 #include "base/signals_blocked.h"
 #include "epics/commands/child_program.h"
@@ -45,15 +46,18 @@ void RouterProcesses::run(const std::stop_token& stop, const std::vector<std::st
   constexpr std::chrono::seconds kLongestPause{30};
   for (std::chrono::seconds pause{1}; !stop.stop_requested();
        pause = std::min(2 * pause, kLongestPause)) {
-    int status = 0;
-    {
+    int status = -1;
+    std::string why;
+    try {
       ChildProgram router("mpf-router", arguments);
       const std::stop_callback terminate(stop, [&] { router.terminate(); });
       status = router.wait();
+    } catch (const std::system_error& error) {  // too many processes, no descriptor
+      why = fmt::format(": {}", error.what());
     }
     if (stop.stop_requested()) return;
-    errlogPrintf("mpf-router %s %s: ended with status %d\n", arguments[0].c_str(),
-                 arguments[1].c_str(), status);
+    errlogPrintf("mpf-router %s %s: ended with status %d%s\n", arguments[0].c_str(),
+                 arguments[1].c_str(), status, why.c_str());
     if (status == kInvalidArguments) return;
     std::unique_lock lock(mutex_);
     ended_.wait_for(lock, stop, pause, [] { return false; });

@@ -4,6 +4,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -46,6 +47,34 @@ TEST_F(LogFollowerTest, ReturnsWholeLinesFromItsBeginning) {
   append(path_, "o\n\x1b[2J\n");
   EXPECT_EQ(follower.takeLines(), "dac | two\ndac | \\x1b[2J\n");
   EXPECT_EQ(follower.takeLines(), "");
+}
+
+TEST_F(LogFollowerTest, ReturnsALongLogInParts) {
+  LogFollower follower(false, std::uint64_t{1} << 30);
+  follower.add("dac", path_);
+  constexpr int kLines = 300'000;
+  std::string text;
+  for (int i = 0; i < kLines; ++i) text += (i % 2 == 0 ? "even\n" : "odd\n");
+  append(path_, text);
+
+  std::int64_t lines = 0;
+  std::size_t longest = 0;
+  do {
+    const auto part = follower.takeLines();
+    lines += std::ranges::count(part, '\n');
+    longest = std::max(longest, part.size());
+  } while (follower.hasMore());
+
+  EXPECT_EQ(lines, kLines);
+  EXPECT_LT(longest, std::size_t{8} << 20);
+}
+
+TEST_F(LogFollowerTest, ReturnsALineWithoutAnEndInParts) {
+  LogFollower follower(false, std::uint64_t{1} << 30);
+  follower.add("dac", path_);
+  append(path_, std::string(200'000, 'x'));
+
+  EXPECT_GE(follower.takeLines().size(), 200'000u);
 }
 
 TEST_F(LogFollowerTest, ColoursNamesOnATerminal) {

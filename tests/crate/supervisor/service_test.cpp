@@ -244,6 +244,18 @@ TEST_F(ServiceTest, AProcessThatCannotBeExecutedIsTriedAgain) {
   EXPECT_EQ(service_.reason(), "no such file");
 }
 
+// The child was started, and ends by itself.
+TEST_F(ServiceTest, AFailedStartOfAChildIsOneFailure) {
+  ASSERT_EQ(action(), Action::start);
+  service_.started(100, 7, now_);
+
+  service_.startFailed("no such file", now_);
+
+  EXPECT_FALSE(service_.isRunning());
+  EXPECT_EQ(service_.pid(), 0);
+  EXPECT_EQ(service_.restarts(), 1);
+}
+
 TEST_F(ServiceTest, AnAdoptedProcessKeepsItsAge) {
   service_.adopted(100, 7, 3, now_, now_ - 5'000'000'000);
 

@@ -46,8 +46,10 @@ class SupervisorTest : public testing::Test {
     write(text, limits);
     run();
   }
-  void run() {
-    supervisor_.emplace(std::vector<std::string>{MPF, "run", files_.file("lab.toml")});
+  void run() { start({MPF, "run", files_.file("lab.toml")}); }
+  // The same with a command of the test.
+  void start(const std::vector<std::string>& command) {
+    supervisor_.emplace(command);
     while (!isAnswering())
       if (supervisor_->hasEnded()) throw std::runtime_error("mpf run: " + supervisor_->errors());
   }

@@ -4,8 +4,10 @@
 #include "crate/supervisor/supervisor.h"
 
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <filesystem>
 #include <thread>
 #include <vector>
 
@@ -197,6 +199,64 @@ TEST_F(SupervisorTest, ANewSupervisorTakesOverWhatRuns) {
   ::kill(one, SIGKILL);
   waitForNew("int32", one);
   EXPECT_TRUE(isReplying("Int32"));
+}
+
+// The old process of this name was stopped; its successor is another one.
+TEST_F(SupervisorTest, AReplacedProcessIsRestartedAndStoppedAfterATakeOver) {
+  run("[[server]]\nname = \"int32\"\nprogram = \"int32\"\nqueue-size = 10\n");
+  waitForState("int32", "ready");
+  const auto first = pidOf("int32");
+  write("[[server]]\nname = \"int32\"\nprogram = \"int32\"\nqueue-size = 11\n");
+  ask({{"do", "reload"}});
+  waitForNew("int32", first);
+  const auto second = pidOf("int32");
+
+  killSupervisor();
+  run();
+  waitForState("int32", "ready");
+  ASSERT_EQ(pidOf("int32"), second);
+  ::kill(second, SIGKILL);
+  waitForNew("int32", second);
+
+  EXPECT_EQ(WEXITSTATUS(stop()), 0);
+}
+
+TEST_F(SupervisorTest, AReloadThatFailsChangesNothing) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto pid = pidOf("int32");
+  ASSERT_EQ(::symlink("/nonexistent/log", folder().log("two").c_str()), 0);
+  write(std::string(kServer) + "[[server]]\nname = \"two\"\nprogram = \"int32\"\n");
+
+  EXPECT_THROW(ask({{"do", "reload"}}), std::runtime_error);
+
+  EXPECT_EQ(stateOf("int32"), "ready");
+  EXPECT_EQ(pidOf("int32"), pid);
+}
+
+TEST_F(SupervisorTest, ContinuesWhileItsStateCannotBeRecorded) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto pid = pidOf("int32");
+  const auto blocked = folder().file("state.json.new");
+  ASSERT_TRUE(std::filesystem::create_directory(blocked));
+
+  ::kill(pid, SIGKILL);
+  while (pidOf("int32") == pid) continue;
+  std::filesystem::remove(blocked);
+
+  waitForNew("int32", pid);
+}
+
+TEST_F(SupervisorTest, ContinuesWhenNobodyReadsItsOutput) {
+  write(kServer);
+  // The reader of the pipe ends at once.
+  start({"/bin/bash", "-c",
+         std::string("exec ") + MPF + " run " + files_.file("lab.toml") + " 2> >(exec true)"});
+
+  waitForState("int32", "ready");
+
+  EXPECT_EQ(WEXITSTATUS(stop()), 0);
 }
 
 TEST_F(SupervisorTest, IsKilledAtRandomMomentsWithoutOrphansOrDoubles) {
