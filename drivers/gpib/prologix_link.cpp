@@ -69,6 +69,14 @@ void PrologixLink::open() {
   becomeUnknown();
 }
 
+// A thread or a descriptor may be lacking for the new port; then the next operation tries again.
+GpibResult PrologixLink::tryReopen() try {
+  open();
+  return {};
+} catch (const std::exception& error) {
+  return {GpibStatus::failure, fmt::format("{}: {}", description_, error.what())};
+}
+
 void PrologixLink::becomeUnknown() {
   state_ = State::unknown;
   reopenAt_ = Deadline::never();
@@ -102,7 +110,9 @@ PrologixLink::Answer PrologixLink::exchange(const Request& request) {
 // Connects, sets the controller up and checks its version. A connection that is lost meanwhile does
 // no harm: then it begins again.
 GpibResult PrologixLink::identify(Deadline deadline) {
-  if (reopenAt_.hasPassed()) open();
+  if (!port_ || reopenAt_.hasPassed()) {
+    if (auto result = tryReopen(); !result.ok()) return result;
+  }
   if (reopenAt_.isNever()) reopenAt_ = Deadline::after(patience_);
   const auto limit = std::min(deadline, Deadline::after(patience_));
   const auto mark = nextMark({});

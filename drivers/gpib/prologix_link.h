@@ -59,7 +59,7 @@ class PrologixLink {
     std::string commands;  // whole lines
     Deadline deadline;
     std::chrono::milliseconds silence{0};  // the ++read_tmo_ms in `commands`, if there is one
-    // NOLINTNEXTLINE(readability-redundant-member-init): g++ wants it
+    // NOLINTNEXTLINE(readability-redundant-member-init): g++ needs it
     std::optional<std::uint8_t> otherMarkThan{};
   };
 
@@ -104,6 +104,7 @@ class PrologixLink {
   GpibResult connect(Deadline deadline);
   void becomeUnknown();
   void open();
+  GpibResult tryReopen();
   GpibResult transact(std::string_view text, Deadline deadline);
   [[nodiscard]] bool wasLost() const;
   [[nodiscard]] GpibResult explainMissingVersion(GpibStatus status) const;

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <string>
+#include <system_error>
 
 #include <mpf/drivers/serial/posix_terminal.h>
 #include <mpf/drivers/serial/tcp_serial_port.h>
@@ -229,6 +230,26 @@ TEST(PrologixLink, TellsWhetherThereWasSilenceBeforeTheEnd) {
 
   withLaterDeadlines([&](Deadline wait) { return hasSilence(false, wait); });
   withLaterDeadlines([&](Deadline wait) { return !hasSilence(true, wait); });
+}
+
+// As when the process has no thread or descriptor left.
+TEST(PrologixLink, APortThatCannotBeOpenedAgainIsAnErrorUntilItCan) {
+  int opened = 0;
+  const auto openPort = [&]() -> std::unique_ptr<SerialPort> {
+    if (++opened == 2) throw std::system_error(EMFILE, std::generic_category(), "open");
+    return openTcpSerialPort(
+        {.address = TcpAddress::parse("127.0.0.1:1"), .waitForServer = true});  // nobody listens
+  };
+  PrologixLink link("the controller", openPort, 1ms);
+  const auto ask = [&] {
+    return link.exchange({.commands = {}, .deadline = Deadline::after(2ms)}).result;
+  };
+
+  GpibResult result;
+  while (opened < 2) result = ask();
+  EXPECT_EQ(result.status, GpibStatus::failure);
+  EXPECT_THAT(result.reason, testing::AllOf(HasSubstr("the controller"), HasSubstr("open")));
+  while (opened < 3) EXPECT_FALSE(ask().ok());
 }
 
 }  // namespace
