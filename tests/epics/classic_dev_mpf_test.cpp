@@ -20,7 +20,11 @@ class Probe : public DevMpf {
  public:
   explicit Probe(aiRecord* record)
       : DevMpf(reinterpret_cast<dbCommon*>(record), &record->inp, true) {}
-  long startIO(dbCommon*) override { return send(request(2), replyTypeCompleteIO); }
+  long startIO(dbCommon*) override {
+    const auto status = send(request(2), replyTypeCompleteIO);
+    if (sendsMore) send(request(3), replyTypeNone);
+    return status;
+  }
   long completeIO(dbCommon* common, Message* message) override {
     auto* record = reinterpret_cast<aiRecord*>(common);
     record->val = static_cast<Float64Message*>(message)->value;
@@ -49,6 +53,7 @@ class Probe : public DevMpf {
   static inline std::promise<std::unique_ptr<Message>> received;
   static inline std::atomic<int> connections = 0;
   static inline std::atomic<int> outOfBand = 0;
+  static inline std::atomic<bool> sendsMore = false;
 
  private:
   static Message* request(int address) {
@@ -73,6 +78,7 @@ class ClassicDevMpfTest : public EpicsTest {
     Probe::received = {};
     Probe::connections = 0;
     Probe::outOfBand = 0;
+    Probe::sendsMore = false;
   }
   static std::string manual(const std::string& fields) {
     return "device(ai, VME_IO, devAiManual, \"manual\")\n"
@@ -121,6 +127,19 @@ TEST_F(ClassicDevMpfTest, ARequestWithoutAReplyIsAnAlarmAndLeavesNoRecordActive)
 
   Ioc::waitFor("v.AMSG", "the server refused the request");
   EXPECT_EQ(Ioc::get("v.PACT"), "0");
+}
+
+TEST_F(ClassicDevMpfTest, ARequestTimesOutAlsoWhenAFurtherMessageWasSent) {
+  Probe::sendsMore = true;
+  std::vector<Message> kept;
+  const ThreadServer server(backplane_, "device", [&](MessageServer&, Message&& request) {
+    kept.push_back(std::move(request));
+  });
+  const Ioc ioc(probe(R"(field(PINI, "YES"))"));
+
+  Ioc::waitFor("v.STAT", "TIMEOUT");
+  EXPECT_EQ(Ioc::get("v.PACT"), "0");
+  kept.clear();
 }
 
 TEST_F(ClassicDevMpfTest, AnAbsentServerIsAnAlarmAndTheRecordRecovers) {
