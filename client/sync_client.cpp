@@ -4,8 +4,8 @@
 namespace mpf {
 namespace {
 
-// One is enough without further replies. With these, the dispatcher looks at deadlines after some.
-constexpr int kMaxLooks = 64;
+// After so many steps the dispatcher has looked at deadlines, however many replies wait.
+constexpr int kStepsToDeadlines = 64;
 
 std::string limitExceeded(const Message& message, std::uint64_t maxBytes) {
   return ": " + std::to_string(message.body().size()) + " bytes, the limit is " +
@@ -75,7 +75,7 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout, Retry retry) {
   if (!answer_) {
     // Delivers `expired` if the server has not received the request. Otherwise the server may still
     // act on the request.
-    for (int looks = 0; looks < kMaxLooks && !answer_; ++looks)
+    for (int steps = 0; steps < kStepsToDeadlines && !answer_; ++steps)
       if (!dispatcher_.runOnce(Deadline::atNs(0))) break;
     if (!answer_) {
       client_.cancel(awaited_);

@@ -28,6 +28,10 @@ void log(const Service& service, const std::string& text) {
   printError("mpf run: {}: {}\n", service.plan().name, text);
 }
 
+void print(const std::vector<LogLimiter::Line>& lines) {
+  for (const auto& line : lines) printError("mpf run: {}\n", line.text);
+}
+
 }  // namespace
 
 Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
@@ -53,8 +57,10 @@ void Supervisor::run() {
     wait();
   }
   tryRecord();
-  do writeError(logs_.takeLines());
-  while (logs_.hasMore());
+  do {
+    writeError(logs_.takeLines());
+  } while (logs_.hasMore());
+  print(problems_.takeAll(Clock::nowNs()));
   ::unlink(folder_.file("control").c_str());
 }
 
@@ -65,9 +71,9 @@ void Supervisor::takeOver() {
     auto* member = find(recorded.name);
     auto pidfd = openPidfd(recorded.pid);
     const bool isAlive = pidfd.get() >= 0 && startTicksOf(recorded.pid) == recorded.startTicks;
-    if (!isAlive && (member == nullptr || !recorded.isStopRequested)) continue;
     if (!isAlive) {
-      member->service.requestStop(Clock::nowNs());
+      if (member != nullptr && recorded.isStopRequested)
+        member->service.requestStop(Clock::nowNs());
       continue;
     }
     if (member == nullptr) {
@@ -274,6 +280,7 @@ void Supervisor::look() {
   });
   if (!isRecorded_) tryRecord();
   const auto now = Clock::nowNs();
+  print(problems_.takeDue(now));
   for (const auto& member : members_) {
     auto& service = member->service;
     const auto watch = watches_.find(service.plan().backplane);
@@ -318,13 +325,9 @@ void Supervisor::record() const {
   state.write(folder_.file("state.json"));
 }
 
-void Supervisor::noteProblem(std::string_view what) noexcept {
-  if (what == problem_) return;
-  printError("mpf run: {}\n", what);
-  try {
-    problem_ = what;
-  } catch (const std::bad_alloc&) {  // then it is reported again
-  }
+void Supervisor::noteProblem(std::string_view what) {
+  if (problems_.admit({__FILE__, __LINE__}, 0, what, Clock::nowNs()))
+    printError("mpf run: {}\n", what);
 }
 
 void Supervisor::tryRecord() {

@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "base/log_limiter.h"
 #include "crate/supervisor/capsule_writer.h"
 #include "crate/supervisor/control_server.h"
 #include "crate/supervisor/crate_state.h"
@@ -69,17 +70,16 @@ class Supervisor {
   void record() const;
   void tryRecord();  // again at the next look, if it fails
   // Does what may fail, for example without a free descriptor, and must not end the supervision.
-  // Returns whether it was done; reports a failure once.
+  // Returns whether it was done.
   template <class Act>
-  bool attempt(const Act& act) noexcept try {
+  bool attempt(const Act& act) try {
     act();
-    problem_.clear();
     return true;
   } catch (const std::exception& error) {
     noteProblem(error.what());
     return false;
   }
-  void noteProblem(std::string_view what) noexcept;
+  void noteProblem(std::string_view what);
   nlohmann::json answer(const nlohmann::json& request);
   [[nodiscard]] nlohmann::json describe() const;
   void wait();
@@ -104,7 +104,7 @@ class Supervisor {
   ControlServer control_{[this](const auto& request) { return answer(request); }};
   std::int64_t nextLookNs_ = 0;
   std::string status_;  // as last reported to systemd
-  std::string problem_;  // the failure that was reported last
+  LogLimiter problems_;  // what attempt() reports
   bool isRecorded_ = true;  // the file has the present state
   bool isShuttingDown_ = false;
 };

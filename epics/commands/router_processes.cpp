@@ -44,21 +44,22 @@ void RouterProcesses::end() {
 void RouterProcesses::run(const std::stop_token& stop, const std::vector<std::string>& arguments) {
   constexpr int kInvalidArguments = 2;
   constexpr std::chrono::seconds kLongestPause{30};
+  bool isOver = false;
   for (std::chrono::seconds pause{1}; !stop.stop_requested();
        pause = std::min(2 * pause, kLongestPause)) {
-    int status = -1;
-    std::string why;
+    std::string end;
     try {
       ChildProgram router("mpf-router", arguments);
       const std::stop_callback terminate(stop, [&] { router.terminate(); });
-      status = router.wait();
+      const int status = router.wait();
+      isOver = status == kInvalidArguments;
+      end = fmt::format("ended with status {}", status);
     } catch (const std::system_error& error) {  // too many processes, no descriptor
-      why = fmt::format(": {}", error.what());
+      end = fmt::format("cannot be started now: {}", error.what());
     }
     if (stop.stop_requested()) return;
-    errlogPrintf("mpf-router %s %s: ended with status %d%s\n", arguments[0].c_str(),
-                 arguments[1].c_str(), status, why.c_str());
-    if (status == kInvalidArguments) return;
+    errlogPrintf("mpf-router %s %s: %s\n", arguments[0].c_str(), arguments[1].c_str(), end.c_str());
+    if (isOver) return;
     std::unique_lock lock(mutex_);
     ended_.wait_for(lock, stop, pause, [] { return false; });
   }

@@ -51,8 +51,8 @@ struct ServerOptions {
   std::int32_t location = Backplane::defaultLocation();
   // Requests of one client that may wait, 1 to 16384; twice as many may have no reply yet. Bodies
   // of up to 24 bytes, such as those of Int32, always have room, as requests and as first replies.
-  // Longer ones need several slots of the queue or one of 256 chunks of memory: with a queueSize of
-  // 369 or more, the last of the longer messages may be refused with noMemory.
+  // Longer ones may need one of 256 chunks of memory for each direction: if more than 256 wait,
+  // further ones may be refused with noMemory.
   int queueSize = 100;
   std::uint64_t maxMessageBytes = 64ull << 20;  // [bytes] largest body of a request or a reply
   std::uint64_t maxPoolBytes = 320ull << 20;  // [bytes] of large messages, per client and direction

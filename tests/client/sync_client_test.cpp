@@ -18,45 +18,44 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(SyncClientTest, ReturnsMessagesThatHaveArrivedWithoutWaiting) {
-  const TestBackplane backplane;
-  MessageServer server(backplane, "device");
+// A client whose request a server has answered and keeps; then nobody runs the server.
+struct Subscription {
+  void reply() {
+    ASSERT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
+  }
+  Subscription() {
+    server.on<Int32>([&](Int32Message&& request) {
+      static_cast<void>(server.reply(server.allocReplyMessage<Int32>(request)));
+      held = std::move(request);
+    });
+    std::thread thread([&] { server.run(); });
+    EXPECT_TRUE(client.call(Int32Message(), 60s));
+    server.interrupt();
+    thread.join();
+  }
+
+  TestBackplane backplane;
+  MessageServer server{backplane, "device"};
   Message held;
-  server.on<Int32>([&](Int32Message&& request) {
-    static_cast<void>(server.reply(server.allocReplyMessage<Int32>(request)));
-    held = std::move(request);
-  });
-  std::thread thread([&] { server.run(); });
-  SyncClient client(backplane, "device");
-  ASSERT_TRUE(client.call(Int32Message(), 60s));
-  server.interrupt();
-  thread.join();
-  EXPECT_FALSE(client.receive(0s));
+  SyncClient client{backplane, "device"};
+};
 
-  ASSERT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
+TEST(SyncClientTest, ReturnsMessagesThatHaveArrivedWithoutWaiting) {
+  Subscription subscription;
+  EXPECT_FALSE(subscription.client.receive(0s));
 
-  EXPECT_TRUE(client.receive(0s));
-  EXPECT_FALSE(client.receive(0s));
+  subscription.reply();
+
+  EXPECT_TRUE(subscription.client.receive(0s));
+  EXPECT_FALSE(subscription.client.receive(0s));
 }
 
 // The dispatcher looks at deadlines only after some messages of a busy link.
 TEST(SyncClientTest, ARequestExpiresBesideFurtherReplies) {
-  const TestBackplane backplane;
-  MessageServer server(backplane, "device", {.queueSize = 200});
-  Message held;
-  server.on<Int32>([&](Int32Message&& request) {
-    static_cast<void>(server.reply(server.allocReplyMessage<Int32>(request)));
-    held = std::move(request);
-  });
-  std::thread thread([&] { server.run(); });
-  SyncClient client(backplane, "device");
-  ASSERT_TRUE(client.call(Int32Message(), 60s));
-  server.interrupt();
-  thread.join();
-  for (int i = 0; i < 50; ++i)
-    ASSERT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
+  Subscription subscription;
+  for (int i = 0; i < 30; ++i) subscription.reply();
 
-  EXPECT_EQ(client.call(Int32Message(), 0s).fate(), Fate::expired);
+  EXPECT_EQ(subscription.client.call(Int32Message(), 0s).fate(), Fate::expired);
 }
 
 TEST(SyncClientTest, ReportsWhyThereIsNoReply) {

@@ -235,7 +235,7 @@ TEST_F(SupervisorTest, AReloadThatFailsChangesNothing) {
 }
 
 TEST_F(SupervisorTest, ContinuesWhileItsStateCannotBeRecorded) {
-  run(kServer);
+  run(kServer, "max-restarts = 1000000\n");  // each start fails meanwhile
   waitForState("int32", "ready");
   const auto pid = pidOf("int32");
   const auto blocked = folder().file("state.json.new");
