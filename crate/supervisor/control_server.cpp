@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "crate/supervisor/control_server.h"
 
+#include <fcntl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -8,6 +9,25 @@
 #include <cerrno>
 
 namespace mpf::crate {
+namespace {
+
+FileDescriptor acceptCaller(const FileDescriptor& listening) {
+  return FileDescriptor(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+}
+
+void reply(const FileDescriptor& caller, const nlohmann::json& reply) {
+  const auto text = reply.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  static_cast<void>(::send(caller.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
+}
+
+FileDescriptor openSpare() { return FileDescriptor(::open("/dev/null", O_RDONLY | O_CLOEXEC)); }
+
+}  // namespace
+
+void ControlServer::listen(const CrateFolder& folder) {
+  listening_ = listenForControl(folder);
+  spare_ = openSpare();
+}
 
 void ControlServer::addTo(std::vector<pollfd>& polled) const {
   polled.push_back({listening_.get(), POLLIN, 0});
@@ -25,11 +45,21 @@ void ControlServer::handle(const std::vector<pollfd>& polled) {
 
 void ControlServer::accept() {
   constexpr std::size_t kMaxCallers = 64;
-  FileDescriptor socket(
-      ::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-  if (socket.get() < 0) return;
+  auto socket = acceptCaller(listening_);
+  if (!socket) {
+    if (errno == EMFILE || errno == ENFILE) refuseCaller();
+    return;
+  }
   if (callers_.size() >= kMaxCallers) callers_.erase(callers_.begin());  // the oldest
   callers_.push_back({std::move(socket), {}});
+}
+
+// A caller that cannot be accepted would wait, and end each poll() at once.
+void ControlServer::refuseCaller() {
+  spare_.reset();
+  if (const auto caller = acceptCaller(listening_))
+    reply(caller, {{"error", "the supervisor has no file descriptor left; try again"}});
+  spare_ = openSpare();
 }
 
 // Returns false when the connection is over.
@@ -40,15 +70,11 @@ bool ControlServer::serve(Caller& caller) {
   caller.request.append(bytes.data(), static_cast<std::size_t>(length));
   if (!caller.request.ends_with('\n'))
     return length != 0 && caller.request.size() < kMaxRequestBytes;
-  nlohmann::json reply;
   try {
-    reply = answer_(nlohmann::json::parse(caller.request));
+    reply(caller.socket, answer_(nlohmann::json::parse(caller.request)));
   } catch (const std::exception& error) {
-    reply = {{"error", error.what()}};
+    reply(caller.socket, {{"error", error.what()}});
   }
-  const auto text = reply.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
-  static_cast<void>(
-      ::send(caller.socket.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
   return false;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // ControlServer: the supervisor's end of the ControlProtocol. It waits for no caller: a request
-// that arrives in pieces is collected, and a reply that a caller does not read is cut off.
+// that arrives in pieces is collected, and a reply that a caller does not read is cut off. When the
+// process has no file descriptor left, a caller gets an error.
 //
 // Threads  one.
 // Trust    a caller may send anything, or nothing: callers and requests are limited.
@@ -24,7 +25,7 @@ class ControlServer {
 
   explicit ControlServer(Answer answer) : answer_(std::move(answer)) {}
   //   throws  std::system_error
-  void listen(const CrateFolder& folder) { listening_ = listenForControl(folder); }
+  void listen(const CrateFolder& folder);
 
   // Adds its descriptors to those for poll().
   void addTo(std::vector<pollfd>& polled) const;
@@ -37,10 +38,12 @@ class ControlServer {
     std::string request;
   };
   void accept();
+  void refuseCaller();
   [[nodiscard]] bool serve(Caller& caller);
 
   Answer answer_;
   FileDescriptor listening_;
+  FileDescriptor spare_;  // its number serves to refuse a caller when there is no other
   std::vector<Caller> callers_;
 };
 

@@ -2,7 +2,6 @@
 // The ends of links: no descriptors left, paused clients, callbacks that run the dispatcher.
 #include <fcntl.h>
 #include <sys/inotify.h>
-#include <sys/resource.h>
 
 #include <array>
 #include <atomic>
@@ -11,24 +10,11 @@
 #include <mpf/file_descriptor.h>
 
 #include "tests/client/client_fixture.h"
+#include "tests/support/no_descriptors.h"
 #include "tests/support/sanitized.h"
 
 namespace mpf::test {
 namespace {
-
-// While this object exists, the process can open no files.
-class NoDescriptors {
- public:
-  NoDescriptors() {
-    ::getrlimit(RLIMIT_NOFILE, &old_);
-    const rlimit none{3, old_.rlim_max};
-    ::setrlimit(RLIMIT_NOFILE, &none);
-  }
-  ~NoDescriptors() { ::setrlimit(RLIMIT_NOFILE, &old_); }
-
- private:
-  rlimit old_{};
-};
 
 using EndMoreTest = ClientTest;
 

@@ -2,13 +2,12 @@
 // Acceptor: clients that knock, lost knocks, unusable links, and shortages.
 #include "server/acceptor.h"
 
-#include <sys/resource.h>
-
 #include <gmock/gmock.h>
 #include <string>
 #include <vector>
 
 #include "tests/server/server_parts_fixture.h"
+#include "tests/support/no_descriptors.h"
 
 namespace mpf::test {
 namespace {
@@ -18,22 +17,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 using AcceptorTest = ServerPartsTest;
-
-// While it exists, this process can open no file.
-class NoDescriptors {
- public:
-  NoDescriptors() {
-    ::getrlimit(RLIMIT_NOFILE, &before_);
-    const rlimit none{0, before_.rlim_max};
-    ::setrlimit(RLIMIT_NOFILE, &none);
-  }
-  ~NoDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
-  NoDescriptors(const NoDescriptors&) = delete;
-  NoDescriptors& operator=(const NoDescriptors&) = delete;
-
- private:
-  rlimit before_{};
-};
 
 TEST_F(AcceptorTest, AClientThatKnocksIsAcceptedOnce) {
   auto& link = createLink();
