@@ -23,8 +23,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-std::atomic<int> handled{0};
-void handle(int) { handled.fetch_add(1, std::memory_order_relaxed); }
+std::atomic<int> signalsHandled{0};
+void handle(int) { signalsHandled.fetch_add(1, std::memory_order_relaxed); }
 
 // A thread that receives SIGUSR1 continuously, with a handler that interrupts system calls.
 class Bombarded {
@@ -36,8 +36,8 @@ class Bombarded {
         }) {}
   // Sends signals until that many have been handled.
   void bombard(int signals) {
-    const int from = handled.load();
-    while (!done_.load() && handled.load() - from < signals) sendOne();
+    const int from = signalsHandled.load();
+    while (!done_.load() && signalsHandled.load() - from < signals) sendOne();
   }
   // Sends signals until the work is done.
   void join() {

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstdlib>
 #include <spawn.h>
 #include <stdexcept>
 #include <string>
@@ -23,6 +24,12 @@
 #include "base/system_call.h"
 
 namespace mpf::test {
+
+// The number of kills in each test: MPF_TEST_KILLS, or `usual` if it is not set.
+inline int killsOr(int usual) {
+  const char* set = std::getenv("MPF_TEST_KILLS");
+  return set != nullptr ? std::atoi(set) : usual;
+}
 
 class Victim {
  public:

@@ -18,7 +18,6 @@
 #include "base/system_call.h"
 #include "shm/segment.h"
 #include "shm/segment_name.h"
-#include "tests/support/sanitized.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/victim.h"
 #include "tests/support/watchdog.h"
@@ -28,11 +27,6 @@ namespace mpf::test {
 namespace {
 
 using namespace std::chrono_literals;
-
-int kills() {
-  const char* set = std::getenv("MPF_TEST_KILLS");
-  return set != nullptr ? std::atoi(set) : kIsSanitized ? 20 : 100;
-}
 
 class FanOutTest : public testing::Test {
  protected:
@@ -77,7 +71,7 @@ TEST_F(FanOutTest, AKilledReaderFreesWhatItHeld) {
   Camera camera(backplane_);
   const auto steady = startActor("reader", 1);
   ASSERT_TRUE(camera.tryShow(1, 3));
-  for (int kill = 0; kill < kills(); ++kill) {
+  for (int kill = 0; kill < killsOr(100); ++kill) {
     const int number = 2 + kill;
     auto victim = startActor("reader", number);
     camera.runUntil([&] { return camera.hasReader(number); });
@@ -135,7 +129,7 @@ TEST_F(FanOutTest, AKilledServerLeavesItsReadersTheirMessagesAndNoFiles) {
   std::mt19937 random(std::random_device{}());
   auto reader = startActor("reader", 1);
   Watcher watcher(backplane_);
-  for (int kill = 1; kill <= kills() / 4; ++kill) {
+  for (int kill = 1; kill <= killsOr(100) / 4; ++kill) {
     auto server = startActor("server", 0);
     const auto until = watcher.received() + 1 + static_cast<int>(random() % 20);
     watcher.runUntil([&] { return watcher.received() >= until; });

@@ -16,7 +16,6 @@
 
 #include "client/relay_client.h"
 #include "shm/segment_name.h"
-#include "tests/support/sanitized.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/victim.h"
 #include "tests/support/watchdog.h"
@@ -25,11 +24,6 @@ namespace mpf::test {
 namespace {
 
 using namespace std::chrono_literals;
-
-int kills() {
-  const char* set = std::getenv("MPF_TEST_KILLS");
-  return set != nullptr ? std::atoi(set) : kIsSanitized ? 100 : 500;
-}
 
 class KillTest : public testing::Test {
  protected:
@@ -95,7 +89,7 @@ TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
   MessageClient client(dispatcher, [&](const Message& message) { ledger.note(message); });
   client.bind("echo");
 
-  for (int round = 0; round < kills(); ++round) {
+  for (int round = 0; round < killsOr(500); ++round) {
     ASSERT_TRUE(client.connectWait(60s)) << client.notConnectedBecause();
     const auto killAt = Deadline::after(std::chrono::microseconds(random_() % 3000));
     bool killed = false;
@@ -111,8 +105,8 @@ TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
   }
 
   EXPECT_TRUE(ledger.open.empty());
-  EXPECT_EQ(ledger.connects, kills());
-  EXPECT_EQ(ledger.disconnects, kills());
+  EXPECT_EQ(ledger.connects, killsOr(500));
+  EXPECT_EQ(ledger.disconnects, killsOr(500));
   EXPECT_EQ(ledger.accepted,
             ledger.replies + ledger.fates[0] + ledger.fates[1] + ledger.fates[2] + ledger.fates[3]);
   EXPECT_GT(ledger.replies, 0u);
@@ -141,7 +135,7 @@ TEST_F(KillTest, RunOnceHandlesADeathAsAnEvent) {
 TEST_F(KillTest, AServerContinuesWhenClientsAreKilled) {
   Victim server("serve", backplaneName());
 
-  for (int round = 0; round < kills(); ++round) {
+  for (int round = 0; round < killsOr(500); ++round) {
     Victim client("flood", backplaneName());
     const auto until = Deadline::after(std::chrono::microseconds(random_() % 8000));
     SyncClient witness(backplane_, "echo");
@@ -171,7 +165,7 @@ TEST_F(KillTest, AServerThatEndsRemovesItsDeadClients) {
 }
 
 TEST_F(KillTest, AKilledServersNameCanBeUsedAtOnce) {
-  for (int round = 0; round < kills() / 4; ++round) {
+  for (int round = 0; round < killsOr(500) / 4; ++round) {
     Victim server("serve", backplaneName());
     SyncClient client(backplane_, "echo");
     ASSERT_TRUE(client.call(Float64Message({.value = 1}), 60s));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Many clients through one pair of routers: each gets its own replies, and all find the restarted
 // server.
-#include "tests/support/sanitized.h"
 #include "tests/system/router_fixture.h"
 
 namespace mpf::test {
@@ -9,7 +8,7 @@ namespace {
 
 class RouterCrowdTest : public RouterTest {
  protected:
-  static constexpr int kProcesses = kIsSanitized ? 5 : 15;
+  static constexpr int kProcesses = 15;
   static constexpr int kClientsOfEach = 10;
 
   RouterCrowdTest() { ::setenv("MPF_LOCATION", std::to_string(RouterPair::kLocation).c_str(), 1); }

@@ -26,6 +26,10 @@ namespace mpf::test {
 
 using namespace std::chrono_literals;
 
+// A router notices within, or not within, the pauses of a test that the other one is silent.
+const RouterPair::Options kSoonDead{"--dead-time", "1s"};
+const RouterPair::Options kPatient{"--dead-time", "60s"};
+
 class RouterTest : public testing::Test {
  protected:
   explicit RouterTest(RouterPlace place = {}) : routers_(std::move(place)) {}

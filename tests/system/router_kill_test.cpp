@@ -7,17 +7,11 @@
 
 #include "tests/support/random.h"
 #include "tests/support/request_log.h"
-#include "tests/support/sanitized.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
-
-int kills() {
-  const char* set = std::getenv("MPF_TEST_KILLS");
-  return set != nullptr ? std::atoi(set) : kIsSanitized ? 12 : 40;
-}
 
 class RouterKillTest : public RouterTest {
  protected:
@@ -146,7 +140,7 @@ TEST_F(RouterKillTest, EachRequestHasOneTrueEndWhenProcessesAreKilled) {
   Victim crowd("crowd", routers_.near().name(), {std::to_string(kCrowd)});
   caller_.emplace(*dispatcher_);
 
-  for (int round = 0; round < kills(); ++round) {
+  for (int round = 0; round < killsOr(40); ++round) {
     waitUntilConnected();
     loadFor(std::chrono::microseconds(random_.below(20'000)));
     killOne();

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 
-#include "tests/support/sanitized.h"
 #include "tests/support/test_backplane.h"
 #include "tests/system/router_fixture.h"
 
@@ -122,22 +121,12 @@ TEST_F(RouterLimitsTest, ConnectionsThatAreResetAtOnceDoNotCount) {
   expectAnswerFor(neighbour);
 }
 
-class RouterWithoutDescriptorsTest : public RouterLimitsTest {
- protected:
-  using RouterLimitsTest::RouterLimitsTest;
-  void SetUp() override {
-    if (kIsSanitized)
-      GTEST_SKIP() << "the sanitizer needs descriptors to read memory, and takes their lack for "
-                      "a fault of the router";
-  }
-};
-
 // The number of files decides which descriptor the router cannot get.
-class RouterFewDescriptorsTest : public RouterWithoutDescriptorsTest,
+class RouterFewDescriptorsTest : public RouterLimitsTest,
                                  public testing::WithParamInterface<rlim_t> {
  protected:
   RouterFewDescriptorsTest()
-      : RouterWithoutDescriptorsTest(
+      : RouterLimitsTest(
             {.address = {}, .enterNear = {}, .enterFar = [] { limitDescriptors(GetParam()); }}) {}
 };
 INSTANTIATE_TEST_SUITE_P(Of, RouterFewDescriptorsTest, testing::Values(48, 49));
@@ -161,9 +150,9 @@ TEST_P(RouterFewDescriptorsTest, CallersBeyondTheLimitOfFilesWaitUntilOthersHang
 }
 
 // Each server that clients wait for needs some files of both routers.
-class RouterFewFilesTest : public RouterWithoutDescriptorsTest {
+class RouterFewFilesTest : public RouterLimitsTest {
  protected:
-  using RouterWithoutDescriptorsTest::RouterWithoutDescriptorsTest;
+  using RouterLimitsTest::RouterLimitsTest;
   // `limited`: the router that reports the limit.
   void expectThatOthersGoOnAndAllGetInLater(RouterProcess& (RouterPair::*limited)()) {
     startAll({"--dead-time", "60s"});
@@ -187,7 +176,7 @@ class RouterFewFilesTest : public RouterWithoutDescriptorsTest {
   void TearDown() override {
     callers_.clear();
     servers_.clear();
-    RouterWithoutDescriptorsTest::TearDown();
+    RouterLimitsTest::TearDown();
   }
 
  private:

@@ -21,8 +21,6 @@ namespace mpf::test {
 namespace {
 
 constexpr std::int64_t kDefaultDeadTimeNs = 2'000'000'000;
-const RouterPair::Options kSoonDead{"--dead-time", "1s"};
-const RouterPair::Options kPatient{"--dead-time", "60s"};
 
 // Creates the line before the routers start.
 struct WiredHosts {

@@ -6,9 +6,6 @@
 namespace mpf::test {
 namespace {
 
-const RouterPair::Options kSoonDead{"--dead-time", "1s"};
-const RouterPair::Options kPatient{"--dead-time", "60s"};
-
 class RouterPauseTest : public RouterTest {
  protected:
   // Sends this number of requests, with unique values.

@@ -8,7 +8,7 @@
 namespace mpf::test {
 namespace {
 
-namespace at = digital_io_word;
+namespace word = digital_io_word;
 using testing::ElementsAre;
 using testing::Pair;
 
@@ -32,12 +32,12 @@ class DigitalIoModelTest : public testing::Test {
 
 // Bits without a function read as ones, since nothing drives them.
 TEST_F(DigitalIoModelTest, HasOnesInItsOutputsAtPowerUpAndZeroesElsewhere) {
-  write(at::kOutput + 1, 0);
+  write(word::kOutput + 1, 0);
   model_.setInputs(0xffffffff, 0);
-  EXPECT_EQ(read(at::kOutput), 0xffff);
-  EXPECT_EQ(read(at::kOutput + 1), 0xff00);
-  EXPECT_EQ(read(at::kInput), 0);
-  EXPECT_EQ(read(at::kInput + 1), 0xff00);
+  EXPECT_EQ(read(word::kOutput), 0xffff);
+  EXPECT_EQ(read(word::kOutput + 1), 0xff00);
+  EXPECT_EQ(read(word::kInput), 0);
+  EXPECT_EQ(read(word::kInput + 1), 0xff00);
   for (const auto word : {6U, 9U, 11U, 13U}) EXPECT_EQ(read(word), 0) << word;
   for (const auto word : {8U, 10U, 12U, 14U}) EXPECT_EQ(read(word), 0xff00) << word;
   for (const auto word : {4U, 5U, 7U, 15U}) EXPECT_EQ(read(word), 0xffff) << word;
@@ -45,40 +45,40 @@ TEST_F(DigitalIoModelTest, HasOnesInItsOutputsAtPowerUpAndZeroesElsewhere) {
 
 TEST_F(DigitalIoModelTest, PullsALineDownByAZeroOnly) {
   model_.setInputs(0xf, 0x3);
-  write(at::kOutput, 0xfffa);
-  EXPECT_EQ(read(at::kInput), 0xfff2);
+  write(word::kOutput, 0xfffa);
+  EXPECT_EQ(read(word::kInput), 0xfff2);
   EXPECT_EQ(model_.driven(), 0x5u);
 }
 
 TEST_F(DigitalIoModelTest, RequestsAnInterruptAtAnEnabledEdgeUntilItIsCleared) {
   watchInterrupt();
-  write(at::kPolarity, 0x1);
-  write(at::kInterruptEnable, 0x3);
+  write(word::kPolarity, 0x1);
+  write(word::kInterruptEnable, 0x3);
   model_.setInputs(0x7, 0x1);  // bit 0 was high, bit 1 falls, bit 2 is not enabled
   EXPECT_TRUE(isAsking_);
-  EXPECT_EQ(read(at::kPending), 0x2);
-  EXPECT_EQ(read(at::kPending), 0x2);
+  EXPECT_EQ(read(word::kPending), 0x2);
+  EXPECT_EQ(read(word::kPending), 0x2);
 
-  write(at::kPending, 0x1);
+  write(word::kPending, 0x1);
   EXPECT_TRUE(isAsking_);
-  write(at::kPending, 0x2);
+  write(word::kPending, 0x2);
   EXPECT_FALSE(isAsking_);
 
   model_.setInputs(0x1, 0);
   EXPECT_FALSE(isAsking_);
   model_.setInputs(0x1, 1);
   EXPECT_TRUE(isAsking_);
-  EXPECT_EQ(read(at::kPending), 0x1);
-  write(at::kInterruptEnable, 0);
+  EXPECT_EQ(read(word::kPending), 0x1);
+  write(word::kInterruptEnable, 0);
   EXPECT_FALSE(isAsking_);
 }
 
 TEST_F(DigitalIoModelTest, SeesEdgesOfItsOwnOutputs) {
   watchInterrupt();
-  write(at::kInterruptEnable + 1, 0x80);
-  write(at::kOutput + 1, 0x7f);
+  write(word::kInterruptEnable + 1, 0x80);
+  write(word::kOutput + 1, 0x7f);
   EXPECT_TRUE(isAsking_);
-  EXPECT_EQ(read(at::kPending + 1), 0xff80);
+  EXPECT_EQ(read(word::kPending + 1), 0xff80);
 }
 
 TEST_F(DigitalIoModelTest, HasNoInterruptRegistersWithoutInterrupts) {
@@ -114,7 +114,7 @@ TEST_F(DigitalIoTest, FollowsAnotherModuleOverWires) {
       start("IP-Unidig-I", {.pollEvery = kNever, .vector = 1, .rising = 0xf, .falling = 0xf});
   model_->connect(2, [wire = wires.wire("dio.17")] { return wire.get(); });
   const ModelWireWatcher watcher(wires, [&] { model_->look(); });
-  other.write(DeviceModel::Space::io, 2 * at::kSystranEnable, 0xf, DeviceModel::kBoth);
+  other.write(DeviceModel::Space::io, 2 * word::kSystranEnable, 0xf, DeviceModel::kBoth);
   DigitalIoListener listener(io);
 
   for (int i = 0; i < 20; ++i) {

@@ -9,7 +9,7 @@
 namespace mpf::test {
 namespace {
 
-namespace at = digital_io_word;
+namespace word = digital_io_word;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
@@ -28,22 +28,22 @@ class DigitalIoRegistersTest : public testing::Test {
 
 TEST_F(DigitalIoRegistersTest, AccessAPairAsOneValue) {
   auto registers = of("IP-Unidig");
-  registers.write(at::kInput, 0xffffff, 0x563412);
+  registers.write(word::kInput, 0xffffff, 0x563412);
   EXPECT_THAT(io_.takeAccesses(), ElementsAre("write16 4 3412", "write16 6 56"));
 
-  EXPECT_EQ(registers.read(at::kInput, 0xffffff), 0x563412U);
+  EXPECT_EQ(registers.read(word::kInput, 0xffffff), 0x563412U);
   EXPECT_THAT(io_.takeAccesses(), ElementsAre("read16 4", "read16 6"));
 }
 
 TEST_F(DigitalIoRegistersTest, AccessNoHalfThatTheMaskOmits) {
   auto registers = of("IP-Unidig");
-  registers.write(at::kOutput, 0x00ff, 0x11112222);
-  registers.write(at::kOutput, 0x10000, 0x11113333);
+  registers.write(word::kOutput, 0x00ff, 0x11112222);
+  registers.write(word::kOutput, 0x10000, 0x11113333);
   EXPECT_THAT(io_.takeAccesses(), ElementsAre("write16 0 2222", "write16 2 1111"));
 
-  EXPECT_EQ(registers.read(at::kOutput, 0xff), 0x2222U);
-  EXPECT_EQ(registers.read(at::kOutput, 0x10000), 0x11110000U);
-  EXPECT_EQ(registers.read(at::kOutput, 0), 0U);
+  EXPECT_EQ(registers.read(word::kOutput, 0xff), 0x2222U);
+  EXPECT_EQ(registers.read(word::kOutput, 0x10000), 0x11110000U);
+  EXPECT_EQ(registers.read(word::kOutput, 0), 0U);
   EXPECT_THAT(io_.takeAccesses(), ElementsAre("read16 0", "read16 2"));
 }
 
