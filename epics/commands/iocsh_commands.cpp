@@ -89,14 +89,15 @@ iocshArg port{"port", iocshArgInt};
 iocshArg address{"host", iocshArgString};
 iocshArg bufferSize{"bufSize (ignored)", iocshArgInt};
 iocshArg queueSize{"queueSize (ignored)", iocshArgInt};
-iocshArg options{"options of mpf-router (default: --plain)", iocshArgString};
+iocshArg routerOptions{"options of mpf-router (default: --plain)", iocshArgString};
 
 iocshArg gpibLink{"GPIB link", iocshArgInt};
 iocshArg gpibServer{"server", iocshArgString};
 
 const iocshArg* const kAnything[] = {&anything};
 const iocshArg* const kLocation[] = {&location};
-const iocshArg* const kRemote[] = {&location, &port, &address, &bufferSize, &queueSize, &options};
+const iocshArg* const kRemote[] = {&location,   &port,      &address,
+                                   &bufferSize, &queueSize, &routerOptions};
 const iocshArg* const kGpibLink[] = {&gpibLink, &location, &gpibServer};
 
 const iocshFuncDef kMpf{"mpf", 1, kAnything, "Runs a command of `mpf`, such as: mpf ls\n"};

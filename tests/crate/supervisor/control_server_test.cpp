@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ControlServer: callers that are slow, that send invalid requests, and that come when no descriptor
-// is left.
+// ControlServer: callers that are slow, send invalid requests, or come when no descriptor is left.
 #include "crate/supervisor/control_server.h"
 
 #include <poll.h>
