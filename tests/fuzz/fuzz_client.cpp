@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "shm/segment_name.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 #include "tests/fuzz/hostile_files.h"
 #include "tests/fuzz/scene.h"
 #include "tests/fuzz/talk.h"
@@ -41,7 +41,7 @@ class Client {
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) {
+void playClient(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files(scene.backplane, {scene.serverName(), scene.hintsOf(scene.server)});
   files.play(input, [] { return Client(scene, files); });

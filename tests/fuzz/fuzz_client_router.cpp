@@ -8,8 +8,10 @@
 
 #include "client/relay_client.h"
 #include "router/outgoing/client_router.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 #include "tests/fuzz/router_scene.h"
+
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // kj::Own destroys the dynamic type
 
 namespace mpf::test {
 namespace {
@@ -78,9 +80,9 @@ class Local {
   MessageClient client_;
 };
 
-class Play {
+class ClientRouterPlay {
  public:
-  Play(RouterScene& scene, std::span<const std::uint8_t> input)
+  ClientRouterPlay(RouterScene& scene, std::span<const std::uint8_t> input)
       : scene_(scene),
         choices_(input),
         context_{scene.io.unixEventPort,
@@ -104,12 +106,12 @@ class Play {
     router_->setPendingBinds({{kLocation, "echo"}});
     scene_.settle();
   }
-  ~Play() {
+  ~ClientRouterPlay() {
     router_ = nullptr;
     scene_.settle();
   }
-  Play(const Play&) = delete;
-  Play& operator=(const Play&) = delete;
+  ClientRouterPlay(const ClientRouterPlay&) = delete;
+  ClientRouterPlay& operator=(const ClientRouterPlay&) = delete;
 
   void run() {
     while (!choices_.isOver()) {
@@ -161,9 +163,9 @@ class Play {
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) {
+void playClientRouter(std::span<const std::uint8_t> input) {
   static RouterScene scene;
-  Play(scene, input).run();
+  ClientRouterPlay(scene, input).run();
 }
 
 }  // namespace mpf::test

@@ -12,7 +12,7 @@
 #include "router/transport/kj_text.h"
 #include "router/transport/plain_item.h"
 #include "schema/conversion.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 #include "tests/fuzz/talk.h"
 
 namespace mpf::test {
@@ -80,7 +80,7 @@ void lookAtPlainItems(capnp::MessageReader& frame, capnp::List<wire::Item>::Read
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) try {
+void playFrames(std::span<const std::uint8_t> input) try {
   if (input.empty()) return;
   const std::size_t part = std::size_t{input.front()} * 4 + 1;
   router::FrameReader reader(kMaxFrameBytes);

@@ -10,7 +10,7 @@
 
 #include "base/system_call.h"
 #include "schema/conversion.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 #include "tests/fuzz/talk.h"
 #include "tools/tap/recording.h"
 
@@ -29,7 +29,7 @@ void take(wire::Record::Reader record) {
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) try {
+void playRecording(std::span<const std::uint8_t> input) try {
   static const FileDescriptor file(
       checkCall(::memfd_create("recording", MFD_CLOEXEC), "create a file"));
   checkCall(::ftruncate(file.get(), static_cast<off_t>(input.size())), "cut a file");

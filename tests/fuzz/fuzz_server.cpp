@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "shm/segment_name.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 #include "tests/fuzz/hostile_files.h"
 #include "tests/fuzz/scene.h"
 #include "tests/fuzz/talk.h"
@@ -45,7 +45,7 @@ class Server {
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) {
+void playServer(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files = [] {
     scene.serverLink.reset();  // Server::attach() replaces it

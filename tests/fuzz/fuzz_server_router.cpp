@@ -5,15 +5,15 @@
 #include <mpf/message_server.h>
 
 #include "router/incoming/server_router.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 #include "tests/fuzz/router_scene.h"
 
 namespace mpf::test {
 namespace {
 
-class Play {
+class ServerRouterPlay {
  public:
-  Play(RouterScene& scene, std::span<const std::uint8_t> input)
+  ServerRouterPlay(RouterScene& scene, std::span<const std::uint8_t> input)
       : scene_(scene),
         choices_(input),
         connection_(makeConnection()),
@@ -24,14 +24,14 @@ class Play {
     openServer();
     scene_.onServers = [this] { router_->lookAtServers(); };
   }
-  ~Play() {
+  ~ServerRouterPlay() {
     scene_.onServers = [] {};
     run_ = nullptr;
     router_ = nullptr;
     scene_.settle();
   }
-  Play(const Play&) = delete;
-  Play& operator=(const Play&) = delete;
+  ServerRouterPlay(const ServerRouterPlay&) = delete;
+  ServerRouterPlay& operator=(const ServerRouterPlay&) = delete;
 
   void run() {
     if (!choices_.oneIn(64)) far_.send(frameOf({greeting()}));
@@ -103,9 +103,9 @@ class Play {
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) {
+void playServerRouter(std::span<const std::uint8_t> input) {
   static RouterScene scene;
-  Play(scene, input).run();
+  ServerRouterPlay(scene, input).run();
 }
 
 }  // namespace mpf::test

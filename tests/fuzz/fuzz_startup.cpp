@@ -7,7 +7,7 @@
 #include <string>
 
 #include "crate/startup/shell/startup_shell.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 
 namespace mpf::test {
 namespace {
@@ -45,7 +45,7 @@ struct Folder {
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) {
+void playStartup(std::span<const std::uint8_t> input) {
   static const Folder folder;
   std::ofstream(folder.path / "st.cmd", std::ios::binary)
       .write(reinterpret_cast<const char*>(input.data()),

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "shm/segment.h"
-#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/fuzzers.h"
 #include "tests/fuzz/hostile_files.h"
 #include "tests/fuzz/scene.h"
 #include "tests/fuzz/talk.h"
@@ -59,7 +59,7 @@ class Reader {
 
 }  // namespace
 
-void play(std::span<const std::uint8_t> input) {
+void playTools(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files(
       scene.backplane, {scene.clientLink->link().name(), scene.serverName(), scene.clientName(),

@@ -7,6 +7,8 @@
 
 #include "tests/fuzz/hostile_files.h"
 
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // kj::Own destroys the dynamic type
+
 namespace mpf::test {
 namespace {
 
