@@ -3,7 +3,7 @@
 //
 //   printError("mpf-x: {}: {}\n", path, reason);
 //
-// Threads  any; a message is one call of write(), so messages do not mix.
+// Threads  any; a message is one call of write(), so messages do not mix. With an ErrorQueue: one.
 // Crash    a message that cannot be written (stderr is closed, full, or a pipe without a reader) is
 //          lost.
 // Trust    the message may contain text of other processes, so printableLines() escapes it.

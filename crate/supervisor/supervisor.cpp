@@ -349,7 +349,8 @@ int Supervisor::waitMs() const {
 void Supervisor::wait() {
   std::vector<pollfd> polled{{signals_.descriptor(), POLLIN, 0},
                              {logs_.descriptor(), POLLIN, 0},
-                             {notify_.descriptor(), POLLIN, 0}};
+                             {notify_.descriptor(), POLLIN, 0},
+                             {errors_.descriptor(), POLLOUT, 0}};
   const auto firstAdopted = polled.size();
   std::vector<Member*> adopted;
   for (const auto& member : members_) {
@@ -369,6 +370,7 @@ void Supervisor::wait() {
   control_.handle({polled.begin() + firstControl, polled.end()});
   if (polled[1].revents != 0 || logs_.hasMore()) writeError(logs_.takeLines());
   if (polled[2].revents != 0) takeReports();
+  if (polled[3].revents != 0) errors_.flush();
   if (std::any_of(polled.begin() + firstWitness, polled.begin() + firstControl,
                   [](const pollfd& one) { return one.revents != 0; }))
     attempt([&] { capsuleWriter_.look(); });

@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "base/error_queue.h"
 #include "base/log_limiter.h"
 #include "crate/supervisor/capsule_writer.h"
 #include "crate/supervisor/control_server.h"
@@ -91,6 +92,7 @@ class Supervisor {
   Member* find(const std::string& name);
   Member& memberOf(const nlohmann::json& request);
 
+  ErrorQueue errors_;  // nobody has to read what the supervisor prints
   CrateFolder folder_;
   std::function<Crate()> load_;
   Crate crate_;
