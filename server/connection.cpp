@@ -6,6 +6,8 @@
 #include <new>
 #include <utility>
 
+#include <mpf/clock.h>
+
 namespace mpf {
 namespace {
 
@@ -32,16 +34,21 @@ bool Connection::tryMakePlace(std::uint32_t requestId) noexcept try {
   const auto size = std::bit_ceil(channel->link().header().maxOutstanding);
   std::vector<std::atomic<std::uint32_t>> larger(unanswered.size() == size ? 0 : size);
   const BiasedLock::Guard guard(*lock);
-  if (larger.empty()) return owed(requestId).load(std::memory_order_relaxed) == 0;
+  if (larger.empty()) return placeOf(requestId).load(std::memory_order_relaxed) == 0;
   for (const auto& place : unanswered) {
     const auto id = place.load(std::memory_order_relaxed);
     if (id != 0) larger[id % size].store(id, std::memory_order_relaxed);
   }
   unanswered = std::move(larger);
   unansweredMask = size - 1;
-  return owed(requestId).load(std::memory_order_relaxed) == 0;
+  return placeOf(requestId).load(std::memory_order_relaxed) == 0;
 } catch (const std::bad_alloc&) {
   return false;
+}
+
+void Connection::noteServiceTime(ReplyCounts& counts) noexcept {
+  counts.service(Clock::nowNs() - timedFromNs);
+  timedId = 0;
 }
 
 void Connection::GiveBack::operator()(Connection* connection) const noexcept {

@@ -14,6 +14,7 @@
 #include <memory>
 #include <vector>
 
+#include "server/reply_counts.h"
 #include "shm/fork_guard.h"
 #include "shm/messages/message_link.h"
 
@@ -47,23 +48,29 @@ struct Connection final : LinkUser {
     return std::uint64_t{index + 1} << 32 | generation;
   }
   // The place of a request in `unanswered`; it contains the id until the first reply.
-  [[nodiscard]] std::atomic<std::uint32_t>& owed(std::uint32_t requestId) noexcept {
+  [[nodiscard]] std::atomic<std::uint32_t>& placeOf(std::uint32_t requestId) noexcept {
     return unanswered[requestId & unansweredMask];
   }
   // Notes that a request was received. Returns false if its id is invalid: another one has the same
   // place. Called by the server's thread, without the lock.
-  [[nodiscard]] bool tryOwe(std::uint32_t requestId) noexcept {
+  [[nodiscard]] bool tryNoteRequest(std::uint32_t requestId) noexcept {
     if (requestId == 0) return false;
-    auto* place = &owed(requestId);
+    auto* place = &placeOf(requestId);
     if (place->load(std::memory_order_relaxed) != 0) {
       if (!tryMakePlace(requestId)) return false;
-      place = &owed(requestId);
+      place = &placeOf(requestId);
     }
     place->store(requestId, std::memory_order_relaxed);
     return true;
   }
-  [[nodiscard]] bool owes(std::uint32_t requestId) noexcept {
-    return requestId != 0 && owed(requestId).load(std::memory_order_relaxed) == requestId;
+  [[nodiscard]] bool isUnanswered(std::uint32_t requestId) noexcept {
+    return requestId != 0 && placeOf(requestId).load(std::memory_order_relaxed) == requestId;
+  }
+  // Under lock: notes that the first reply to a request was sent.
+  [[gnu::always_inline]] void noteFirstReply(std::uint32_t requestId,
+                                             ReplyCounts& counts) noexcept {
+    placeOf(requestId).store(0, std::memory_order_relaxed);
+    if (requestId == timedId) noteServiceTime(counts);
   }
 
   ForkGuard forkGuard;
@@ -81,6 +88,7 @@ struct Connection final : LinkUser {
   Connection* nextFree = nullptr;
 
  private:
+  void noteServiceTime(ReplyCounts& counts) noexcept;
   [[nodiscard]] bool tryMakePlace(std::uint32_t requestId) noexcept;
 };
 

@@ -174,15 +174,15 @@ Route Connections::routeTo(std::uint64_t client, std::uint32_t requestId) const 
           static_cast<std::uint32_t>(client), nullptr};
 }
 
-bool Connections::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
+bool Connections::isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept {
   const auto route = routeTo(client, requestId);
   if (route.link == 0) return false;
   auto& connection = Connection::of(route);
   const BiasedLock::Guard lock(*connection.lock);
-  return connection.isOpenFor(route) && connection.owes(requestId);
+  return connection.isOpenFor(route) && connection.isUnanswered(requestId);
 }
 
-std::vector<std::uint32_t> Connections::owed(std::uint64_t client) const {
+std::vector<std::uint32_t> Connections::unanswered(std::uint64_t client) const {
   const auto route = routeTo(client, 0);
   std::vector<std::uint32_t> ids;
   if (route.link == 0) return ids;

@@ -61,8 +61,8 @@ class Connections {
   // The route to a client; its link is 0 when no client ever had that number.
   [[nodiscard]] Route routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept;
   // Whether a request that was received has no reply; all such requests of a client.
-  [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
-  [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
+  [[nodiscard]] bool isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept;
+  [[nodiscard]] std::vector<std::uint32_t> unanswered(std::uint64_t client) const;
 
  private:
   void reportClient(std::uint64_t client, bool isConnected) noexcept;

@@ -11,6 +11,7 @@
 #include <mpf/clock.h>
 
 #include "base/step.h"
+#include "server/reply_result.h"
 
 namespace mpf {
 namespace {
@@ -26,21 +27,6 @@ std::uint32_t checkedMaxBorrowed(int count) {
 
 auto chunkAt(const std::vector<std::shared_ptr<FanOutChunk>>& chunks, const std::byte* data) {
   return std::ranges::find_if(chunks, [data](const auto& chunk) { return chunk->data() == data; });
-}
-
-ReplyResult resultOf(LinkSend sent) noexcept {
-  switch (sent) {
-    case LinkSend::full:
-      return ReplyResult::queueFull;
-    case LinkSend::tooLarge:
-      return ReplyResult::tooLarge;
-    case LinkSend::noMemory:
-      return ReplyResult::noMemory;
-    case LinkSend::sent:
-    case LinkSend::sentInPlace:
-      break;
-  }
-  return ReplyResult::sent;
 }
 
 }  // namespace
@@ -142,7 +128,7 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   if (!connection.isOpenFor(route)) return ReplyResult::clientGone;
   auto& link = connection.channel->link();
   if (link.header().serverWindow != serverWindow_) return ReplyResult::clientGone;
-  const bool first = connection.owes(route.requestId);
+  const bool first = connection.isUnanswered(route.requestId);
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
   envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
@@ -158,15 +144,11 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   const auto result =
       missed ? link.tryRelayFanOut(envelope, chunk, bytes, limits, maxBorrowed_, *missed)
              : link.trySendFanOut(envelope, chunk, bytes, limits, maxBorrowed_);
-  if (result != LinkSend::sent) return resultOf(result);
+  if (result != LinkSend::sent) return replyResult(result);
   MPF_STEP(reply_sent);
-  if (first) connection.owed(route.requestId).store(0, std::memory_order_relaxed);
+  if (first) connection.noteFirstReply(route.requestId, counts_);
   counts_.sent();
   link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
-  if (route.requestId == connection.timedId && first) {
-    counts_.service(Clock::nowNs() - connection.timedFromNs);
-    connection.timedId = 0;
-  }
   if (link.borrowedFanOut() == 1) noteBorrower(connection.channel);
   return ReplyResult::sent;
 }

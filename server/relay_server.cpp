@@ -22,11 +22,11 @@ ReplyResult RelayServer::replyTo(std::uint64_t client, std::uint32_t requestId, 
   if (message) message.setRoute(own);
   return result;
 }
-bool RelayServer::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
-  return core_->connections().owes(client, requestId);
+bool RelayServer::isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept {
+  return core_->connections().isUnanswered(client, requestId);
 }
-std::vector<std::uint32_t> RelayServer::owed(std::uint64_t client) const {
-  return core_->connections().owed(client);
+std::vector<std::uint32_t> RelayServer::unanswered(std::uint64_t client) const {
+  return core_->connections().unanswered(client);
 }
 BodyBytes RelayServer::allocateBody(std::uint64_t client, std::size_t bytes) {
   return ReplySender::allocate(core_->connections().routeTo(client, 0), bytes);

@@ -30,9 +30,9 @@ class RelayServer : public MessageServer {
   // empty handle.
   void setPolled(bool isPolled) noexcept;
   // Whether that request still has no reply.
-  [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
+  [[nodiscard]] bool isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept;
   // The requests of a client that were received and still have no reply.
-  [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
+  [[nodiscard]] std::vector<std::uint32_t> unanswered(std::uint64_t client) const;
   // Allocates memory for the body of a reply to a client; the caller owns it: see BodyBytes.
   //   throws  std::bad_alloc
   [[nodiscard]] BodyBytes allocateBody(std::uint64_t client, std::size_t bytes);

@@ -7,6 +7,7 @@
 #include <mpf/clock.h>
 
 #include "base/step.h"
+#include "server/reply_result.h"
 
 namespace mpf {
 namespace {
@@ -98,7 +99,7 @@ RepliedMany ReplySender::sendRun(const Message& request, const Bodies& bodies) n
       bodies.fillSlots() && bodies.size <= connection.channel->link().maxMessageBytes();
   // The first reply, which ends the request, and bodies of other lengths go as messages. They are
   // copies: a body in a chunk would be sent in place, and the chunk belongs to the caller.
-  while (sent.count < count && (!fillSlots || connection.owes(route.requestId))) {
+  while (sent.count < count && (!fillSlots || connection.isUnanswered(route.requestId))) {
     auto message = Message::copyInline(bodies.type, bodies.from(sent.count).first(1).all);
     message.setRoute({route.link, route.requestId, route.flags, nullptr});
     message.setClientType(request.getClientType());
@@ -172,9 +173,7 @@ std::size_t ReplySender::sendRunLocked(Connection& connection, RequestRun& run) 
     sent += count;
   }
   for (std::size_t index = 0; index < sent; ++index) {
-    const auto requestId = run[index].requestId();
-    connection.owed(requestId).store(0, std::memory_order_relaxed);
-    if (requestId == connection.timedId) noteServiceTime(connection);
+    connection.noteFirstReply(run[index].requestId(), counts_);
   }
   counts_.sent(sent);
   return sent;
@@ -204,7 +203,7 @@ void ReplySender::refuse(Connection& connection, std::uint32_t generation, const
   const auto givenNs = message.getTimeStampNs();
   const auto timeNs = stamps_ && givenNs == 0 ? Clock::wallNs() : givenNs;
   const auto requestId = message.route().requestId;
-  const bool isFirst = connection.owes(requestId);
+  const bool isFirst = connection.isUnanswered(requestId);
   const auto envelope = [&]() __attribute__((always_inline)) {
     return Envelope{
         .type = static_cast<std::uint16_t>(message.getType()),
@@ -223,21 +222,13 @@ void ReplySender::refuse(Connection& connection, std::uint32_t generation, const
   link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
   if (!isFirst) return ReplyResult::sent;
   static_cast<void>(message.exchangeKeeper(nullptr));
-  connection.owed(requestId).store(0, std::memory_order_relaxed);
-  if (requestId == connection.timedId) noteServiceTime(connection);
+  connection.noteFirstReply(requestId, counts_);
   return ReplyResult::sent;
-}
-
-// After the first reply to the request that is timed.
-void ReplySender::noteServiceTime(Connection& connection) noexcept {
-  counts_.service(Clock::nowNs() - connection.timedFromNs);
-  connection.timedId = 0;
 }
 
 ReplyResult ReplySender::noteRefused(LinkSend result) noexcept {
   counts_.notSent();
-  if (result == LinkSend::full) return ReplyResult::queueFull;
-  return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
+  return replyResult(result);
 }
 
 void ReplySender::sendFate(Connection& connection, RequestMarks request, Fate fate) noexcept {
@@ -252,7 +243,7 @@ void ReplySender::refuseAbandoned(const Route& route) noexcept {
   auto& connection = Connection::of(route);
   if (connection.isInherited()) return;
   const BiasedLock::Guard lock(*connection.lock);
-  if (!connection.isOpenFor(route) || !connection.owes(route.requestId)) return;
+  if (!connection.isOpenFor(route) || !connection.isUnanswered(route.requestId)) return;
   Message message = RequestFateMessage({.fate = Fate::refused, .requestId = route.requestId});
   message.setRoute(connection.routeOf(route.requestId, nullptr));
   if (sendOneLocked(connection, message) == ReplyResult::sent) counts_.refused();

@@ -54,7 +54,6 @@ class ReplySender {
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
   // The caller counts what was sent.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
-  void noteServiceTime(Connection& connection) noexcept;
   ReplyResult noteRefused(LinkSend result) noexcept;
 
   ReplyCounts& counts_;

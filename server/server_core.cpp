@@ -126,7 +126,7 @@ bool ServerCore::hasRequest(Connection& connection) noexcept {
   }
   auto& control = endpoint_.control();
   count(control.received);
-  if (!connection.tryOwe(envelope.requestId)) {
+  if (!connection.tryNoteRequest(envelope.requestId)) {
     closeForProtocolError(connection);
     return false;
   }
@@ -255,7 +255,7 @@ bool ServerCore::tryNoteTaken(Connection& connection, const RequestRun& run) noe
   count(endpoint_.control().received, run.size());
   std::size_t timed = run.size();
   for (std::size_t index = run.size(); index-- != 0;) {
-    if (!connection.tryOwe(run[index].requestId())) {
+    if (!connection.tryNoteRequest(run[index].requestId())) {
       closeForProtocolError(connection);
       return false;
     }

@@ -84,7 +84,7 @@ bool Proxy::tryOpen(std::uint64_t local) {
 
 void Proxy::close(std::uint32_t number) {
   recent_ = nullptr;
-  owed_ -= clients_.at(number).owed;
+  unanswered_ -= clients_.at(number).unanswered;
   clients_.erase(number);
   connection_.removeClient(number);
   connection_.line().send([number](wire::Item::Builder item) { item.setClose(number); });
@@ -127,7 +127,7 @@ Proxy::Client* Proxy::tryFindOrOpen(std::uint64_t local) {
   const auto found = numbers_.find(local);
   if (found == numbers_.end()) return nullptr;
   if (const auto known = clients_.find(found->second);
-      known != clients_.end() && known->second.owed == 0 && known->second.refusal &&
+      known != clients_.end() && known->second.unanswered == 0 && known->second.refusal &&
       known->second.refusal->openAgain.hasPassed()) {
     close(found->second);
     found->second = 0;
@@ -142,8 +142,8 @@ void Proxy::forward(Message request) {
   // From here on, the far server or this class ends the request, not the destructor of its handle.
   request.exchangeKeeper(nullptr);
   const auto requestId = request.route().requestId;
-  ++client->owed;
-  ++owed_;
+  ++client->unanswered;
+  ++unanswered_;
   if (client->refusal)
     return endRequest(client->number, requestId, Fate::refused, client->refusal->why);
   const auto takeBefore = server_.takeBefore();
@@ -161,13 +161,13 @@ void Proxy::drain(Fate fate) {
   state_ = State::draining;
   drainUntil_ = Deadline::after(context_.config.limits.deadTime);
   for (const auto& [number, client] : clients_) {
-    for (const auto requestId : server_.owed(client.local)) end(number, requestId, fate);
+    for (const auto requestId : server_.unanswered(client.local)) end(number, requestId, fate);
   }
 }
 
 bool Proxy::isDone() const noexcept {
   if (!isDraining()) return false;
-  const bool isEmpty = owed_ == 0 && std::ranges::all_of(clients_, [](const auto& each) {
+  const bool isEmpty = unanswered_ == 0 && std::ranges::all_of(clients_, [](const auto& each) {
                          return each.second.held.empty();
                        });
   return isEmpty || drainUntil_.hasPassed();
@@ -177,14 +177,14 @@ bool Proxy::isDone() const noexcept {
 
 // Whether a request is pending: no reply or fate has been delivered, and none is held for it.
 bool Proxy::awaits(const Client& client, std::uint32_t requestId) const noexcept {
-  return server_.owes(client.local, requestId) &&
+  return server_.isUnanswered(client.local, requestId) &&
          std::ranges::none_of(client.held,
                               [&](const Held& held) { return held.requestId == requestId; });
 }
 
 void Proxy::ended(Client& client) noexcept {
-  --client.owed;
-  --owed_;
+  --client.unanswered;
+  --unanswered_;
 }
 
 Proxy::Client* Proxy::tryFind(std::uint32_t number) {
@@ -330,7 +330,8 @@ void Proxy::retryHeld() {
   for (auto& [number, client] : clients_) {
     while (!client.held.empty()) {
       auto& [requestId, message] = client.held.front();
-      if (!tryDeliver(client, requestId, message, server_.owes(client.local, requestId))) break;
+      if (!tryDeliver(client, requestId, message, server_.isUnanswered(client.local, requestId)))
+        break;
       client.held.pop_front();
     }
   }

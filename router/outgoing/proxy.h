@@ -83,7 +83,7 @@ class Proxy final : private Polled {
   struct Client {
     std::uint32_t number = 0;
     std::uint64_t local = 0;  // its number in MessageServer
-    std::uint32_t owed = 0;  // requests that have not ended
+    std::uint32_t unanswered = 0;  // requests that have not ended
     ReplyWindow window{0};  // as sent in `open`
     bool heldQueueFull = false;  // `held` contains a connectQueueFull
     std::list<Held> held;  // replies for which the client has no room
@@ -119,7 +119,7 @@ class Proxy final : private Polled {
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
   Client* recent_ = nullptr;  // of the last message: a run of messages costs one look-up
   Log log_;
-  std::uint64_t owed_ = 0;
+  std::uint64_t unanswered_ = 0;
   State state_ = State::ready;
   Deadline drainUntil_ = Deadline::never();  // set by drain()
   std::chrono::milliseconds retryAfter_{};

@@ -44,12 +44,12 @@ TEST(ConnectionTest, OwesARequestByItsFullId) {
   connection->unanswered = std::vector<std::atomic<std::uint32_t>>(8);
   connection->unansweredMask = 7;
 
-  connection->owed(9).store(9, std::memory_order_relaxed);
+  connection->placeOf(9).store(9, std::memory_order_relaxed);
 
-  EXPECT_TRUE(connection->owes(9));
-  EXPECT_FALSE(connection->owes(1)) << "has the same place";
-  EXPECT_FALSE(connection->owes(2));
-  EXPECT_FALSE(connection->owes(0)) << "means no request";
+  EXPECT_TRUE(connection->isUnanswered(9));
+  EXPECT_FALSE(connection->isUnanswered(1)) << "has the same place";
+  EXPECT_FALSE(connection->isUnanswered(2));
+  EXPECT_FALSE(connection->isUnanswered(0)) << "means no request";
 }
 
 }  // namespace

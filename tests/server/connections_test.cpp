@@ -51,7 +51,7 @@ TEST_F(ConnectionsTest, AClosedConnectionIsReportedAndForgotten) {
   EXPECT_THAT(reports_, ElementsAre(Pair(client, true), Pair(client, false)));
   EXPECT_FALSE(connections_.contains(link.header().incarnation));
   EXPECT_EQ(Connections::clientOf(route), 0u);
-  EXPECT_FALSE(connections_.owes(client, 3));
+  EXPECT_FALSE(connections_.isUnanswered(client, 3));
   EXPECT_EQ(valueOf(control().linksClosed), 1u);
 }
 
@@ -74,10 +74,10 @@ TEST_F(ConnectionsTest, ARequestWithoutReplyIsOwedToItsClient) {
   owe(connection, 3);
   owe(connection, 5);
 
-  EXPECT_TRUE(connections_.owes(client, 3));
-  EXPECT_FALSE(connections_.owes(client, 4));
-  EXPECT_FALSE(connections_.owes(client + (std::uint64_t{1} << 32), 3)) << "another client";
-  EXPECT_THAT(connections_.owed(client), testing::UnorderedElementsAre(3u, 5u));
+  EXPECT_TRUE(connections_.isUnanswered(client, 3));
+  EXPECT_FALSE(connections_.isUnanswered(client, 4));
+  EXPECT_FALSE(connections_.isUnanswered(client + (std::uint64_t{1} << 32), 3)) << "another client";
+  EXPECT_THAT(connections_.unanswered(client), testing::UnorderedElementsAre(3u, 5u));
   EXPECT_EQ(connections_.routeTo(0, 3).link, 0u) << "no client has the number 0";
 }
 
@@ -133,9 +133,10 @@ TEST_F(ConnectionsTest, ARequestWaitsForTheReplyThatMakesItsPlaceFree) {
   auto& link = createLink();
   auto& connection = accept(link);
   const auto places = std::bit_ceil(link.header().maxOutstanding);
-  ASSERT_TRUE(connection.tryOwe(1));
+  ASSERT_TRUE(connection.tryNoteRequest(1));
   while (connection.unanswered.size() != places)
-    ASSERT_TRUE(connection.tryOwe(1 + static_cast<std::uint32_t>(connection.unanswered.size())));
+    ASSERT_TRUE(
+        connection.tryNoteRequest(1 + static_cast<std::uint32_t>(connection.unanswered.size())));
   std::atomic<bool> isReplying{false};
   std::atomic<bool> isNext{false};
   std::thread replying([&] {
@@ -143,17 +144,17 @@ TEST_F(ConnectionsTest, ARequestWaitsForTheReplyThatMakesItsPlaceFree) {
     isReplying = true;
     while (!isNext) std::this_thread::yield();
     for (int i = 0; i < 1000; ++i) std::this_thread::yield();
-    connection.owed(1).store(0, std::memory_order_relaxed);
+    connection.placeOf(1).store(0, std::memory_order_relaxed);
   });
   while (!isReplying) std::this_thread::yield();
 
   isNext = true;
-  const bool isOwed = connection.tryOwe(1 + places);
+  const bool isNoted = connection.tryNoteRequest(1 + places);
 
   replying.join();
-  EXPECT_TRUE(isOwed);
-  EXPECT_TRUE(connection.owes(1 + places));
-  EXPECT_FALSE(connection.tryOwe(1)) << "not free now";
+  EXPECT_TRUE(isNoted);
+  EXPECT_TRUE(connection.isUnanswered(1 + places));
+  EXPECT_FALSE(connection.tryNoteRequest(1)) << "not free now";
 }
 
 TEST_F(ConnectionsTest, CloseAllEndsEachConnection) {

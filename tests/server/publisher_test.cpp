@@ -98,7 +98,7 @@ TEST_F(PublisherTest, TheFirstReplyEndsTheRequestAndFurtherOnesFollow) {
   const auto message = filled(1);
 
   ASSERT_EQ(publish(message, subscriber.request), ReplyResult::sent);
-  EXPECT_FALSE(subscriber.connection.owes(7));
+  EXPECT_FALSE(subscriber.connection.isUnanswered(7));
   ASSERT_EQ(publish(message, subscriber.request), ReplyResult::sent);
 
   EXPECT_NE(take(subscriber.link).flags & layout::kSlotFirstReply, 0);

@@ -74,13 +74,13 @@ TEST_F(RelayTest, AReplyByNumbersReachesItsRequest) {
     route.keeper = nullptr;
     request.setRoute(route);
   }
-  EXPECT_TRUE(server.owes(client, id));
-  EXPECT_FALSE(server.owes(client, id + 1));
-  EXPECT_THAT(server.owed(client), testing::ElementsAre(id));
+  EXPECT_TRUE(server.isUnanswered(client, id));
+  EXPECT_FALSE(server.isUnanswered(client, id + 1));
+  EXPECT_THAT(server.unanswered(client), testing::ElementsAre(id));
 
   EXPECT_EQ(server.replyTo(client, id, Int32Message({.value = 4})), ReplyResult::sent);
-  EXPECT_FALSE(server.owes(client, id));
-  EXPECT_THAT(server.owed(client), testing::IsEmpty());
+  EXPECT_FALSE(server.isUnanswered(client, id));
+  EXPECT_THAT(server.unanswered(client), testing::IsEmpty());
   EXPECT_EQ(server.replyTo(client, id, Int32Message({.value = 5})), ReplyResult::sent);
   EXPECT_EQ(server.replyTo(client + 1, id, Int32Message()), ReplyResult::clientGone);
 

@@ -39,7 +39,7 @@ TEST_F(ReplySenderTest, TheFirstReplyEndsTheRequest) {
 
   EXPECT_EQ(replies_.send(first), ReplyResult::sent);
   EXPECT_FALSE(first);
-  EXPECT_FALSE(connection_.owes(3));
+  EXPECT_FALSE(connection_.isUnanswered(3));
   EXPECT_EQ(replies_.send(further), ReplyResult::sent);
 
   const auto received = take(link_);
@@ -85,7 +85,7 @@ TEST_F(ReplySenderTest, AReplyAboveTheLimitStaysWithItsOwner) {
 
   EXPECT_TRUE(reply);
   EXPECT_EQ(reply.route().requestId, 3u);
-  EXPECT_TRUE(connection_.owes(3));
+  EXPECT_TRUE(connection_.isUnanswered(3));
   EXPECT_EQ(valueOf(control().replyQueueFull), 1u);
 }
 
@@ -134,7 +134,7 @@ TEST_F(ReplySenderTest, AFateEndsTheRequest) {
   replies_.sendFate(connection_, {.requestId = 3}, Fate::expired);
 
   EXPECT_TRUE(takesFate(link_, 3, Fate::expired));
-  EXPECT_FALSE(connection_.owes(3));
+  EXPECT_FALSE(connection_.isUnanswered(3));
 }
 
 TEST_F(ReplySenderTest, ALargeBodyIsInThePoolWhileTheClientIsConnected) {
