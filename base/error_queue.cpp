@@ -7,10 +7,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <climits>
 #include <exception>
 #include <fmt/format.h>
+
+#include <mpf/clock.h>
 
 #include "base/system_call.h"
 
@@ -27,6 +31,17 @@ FileDescriptor tryReopenStderr() {
   return FileDescriptor(::open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
 }
 
+// For a terminal or a pipe of another user, which cannot be opened again. A pipe that is ready
+// accepts PIPE_BUF bytes; a terminal may accept less, and make us wait.
+std::int64_t writeIfReady(std::string_view bytes) noexcept {
+  pollfd polled{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&polled, 1, 0) == 0) {
+    errno = EAGAIN;
+    return -1;
+  }
+  return ::write(STDERR_FILENO, bytes.data(), std::min<std::size_t>(bytes.size(), PIPE_BUF));
+}
+
 }  // namespace
 
 ErrorQueue::ErrorQueue() : reopened_(tryReopenStderr()) { theQueue = this; }
@@ -34,7 +49,7 @@ ErrorQueue::ErrorQueue() : reopened_(tryReopenStderr()) { theQueue = this; }
 ErrorQueue::~ErrorQueue() {
   const auto deadline = Deadline::after(std::chrono::seconds(1));
   flush();
-  while (descriptor() >= 0) {
+  while (!isEmpty() && !deadline.hasPassed()) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
     pollfd polled{descriptor(), POLLOUT, 0};
     if (retryInterrupted([&] { return ::poll(&polled, 1, static_cast<int>(left.count())); }) <= 0)
@@ -47,26 +62,29 @@ ErrorQueue::~ErrorQueue() {
 ErrorQueue* ErrorQueue::current() noexcept { return theQueue; }
 
 int ErrorQueue::descriptor() const noexcept {
-  if (kept_.empty() && dropped_ == 0) return -1;
+  if (isEmpty()) return -1;
   return reopened_ ? reopened_.get() : STDERR_FILENO;
 }
 
 void ErrorQueue::write(std::string_view message) noexcept try {
   flush();
-  if (kept_.size() + message.size() > kMaxBytes || dropped_ != 0) {
-    ++dropped_;
-    return;
-  }
+  // After a dropped one, others would come before the line that tells it.
+  const bool isFull = !kept_.empty() && kept_.size() + message.size() > kMaxBytes;
+  if (isFull || dropped_ != 0) return drop(message);
   kept_.append(message);
   tryWriteKept();
 } catch (const std::exception&) {  // no memory
-  ++dropped_;
+  drop(message);
+}
+
+void ErrorQueue::drop(std::string_view message) noexcept {
+  dropped_ += static_cast<std::uint64_t>(std::ranges::count(message, '\n'));
 }
 
 void ErrorQueue::flush() noexcept try {
   tryWriteKept();
   if (dropped_ == 0 || !kept_.empty()) return;
-  kept_ = fmt::format("{} messages are missing here: nobody read them\n", dropped_);
+  kept_ = fmt::format("{} lines are missing here: the reader of stderr was too slow\n", dropped_);
   dropped_ = 0;
   tryWriteKept();
 } catch (
@@ -90,7 +108,7 @@ std::int64_t ErrorQueue::tryWrite(std::string_view bytes) const noexcept {
     const auto sent =
         ::send(STDERR_FILENO, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
     if (sent >= 0 || errno != ENOTSOCK) return sent;
-    return ::write(STDERR_FILENO, bytes.data(), bytes.size());
+    return writeIfReady(bytes);
   });
 }
 

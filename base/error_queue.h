@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // ErrorQueue: while it exists, writeError() and printError() do not wait for the reader of stderr.
-// What a stopped terminal (Ctrl-S) or a pipe whose reader hangs does not accept is kept. Beyond
-// kMaxBytes messages are dropped, and a line tells how many.
+// What a stopped terminal (Ctrl-S) or a pipe whose reader hangs does not accept is kept. While more
+// than kMaxBytes would be kept, messages are dropped, and a line tells how many lines that were.
 //
 //   ErrorQueue errors;
 //   polled.push_back({errors.descriptor(), POLLOUT, 0});
@@ -16,7 +16,6 @@
 #include <string>
 #include <string_view>
 
-#include <mpf/clock.h>
 #include <mpf/file_descriptor.h>
 
 namespace mpf {
@@ -35,7 +34,9 @@ class ErrorQueue {
   // The one that exists; nullptr: none.
   [[nodiscard]] static ErrorQueue* current() noexcept;
 
-  // For poll() and POLLOUT; negative while nothing is kept.
+  // Whether the reader has taken everything.
+  [[nodiscard]] bool isEmpty() const noexcept { return kept_.empty() && dropped_ == 0; }
+  // For poll() and POLLOUT; negative while it is empty.
   [[nodiscard]] int descriptor() const noexcept;
   // Writes the message, or keeps it.
   void write(std::string_view message) noexcept;
@@ -43,12 +44,13 @@ class ErrorQueue {
   void flush() noexcept;
 
  private:
+  void drop(std::string_view message) noexcept;
   void tryWriteKept() noexcept;
   [[nodiscard]] std::int64_t tryWrite(std::string_view bytes) const noexcept;
 
   FileDescriptor reopened_;  // stderr, opened again, so that nobody else is affected by O_NONBLOCK
   std::string kept_;
-  std::uint64_t dropped_ = 0;  // messages, since the last line that told it
+  std::uint64_t dropped_ = 0;  // lines, since the last line that told it
 };
 
 }  // namespace mpf

@@ -75,8 +75,9 @@ nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& re
   checkCall(::connect(socket.get(), address.get(), sizeof address.address), "connect",
             folder.file("control"));
   const auto text = request.dump() + "\n";
-  checkCall(::send(socket.get(), text.data(), text.size(), MSG_NOSIGNAL), "send",
-            folder.file("control"));
+  // EPIPE: the supervisor has refused us already; its reply says why.
+  if (::send(socket.get(), text.data(), text.size(), MSG_NOSIGNAL) < 0 && errno != EPIPE)
+    throwSystemError(errno, "send", folder.file("control"));
   auto reply = nlohmann::json::parse(readLine(socket.get(), Deadline::after(patience)));
   if (reply.contains("error")) throw std::runtime_error(reply.at("error").get<std::string>());
   return reply;

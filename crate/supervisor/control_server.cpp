@@ -15,7 +15,7 @@ FileDescriptor acceptCaller(const FileDescriptor& listening) {
   return FileDescriptor(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
 }
 
-void reply(const FileDescriptor& caller, const nlohmann::json& reply) {
+void sendReply(const FileDescriptor& caller, const nlohmann::json& reply) {
   const auto text = reply.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   static_cast<void>(::send(caller.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
 }
@@ -50,15 +50,16 @@ void ControlServer::accept() {
     if (errno == EMFILE || errno == ENFILE) refuseCaller();
     return;
   }
+  if (!spare_) spare_ = openSpare();  // it could not be opened again after refuseCaller()
   if (callers_.size() >= kMaxCallers) callers_.erase(callers_.begin());  // the oldest
   callers_.push_back({std::move(socket), {}});
 }
 
-// A caller that cannot be accepted would wait, and end each poll() at once.
+// A caller that is not accepted stays in the queue, so that each poll() returns at once.
 void ControlServer::refuseCaller() {
   spare_.reset();
   if (const auto caller = acceptCaller(listening_))
-    reply(caller, {{"error", "the supervisor has no file descriptor left; try again"}});
+    sendReply(caller, {{"error", "the supervisor has no file descriptor left; try again"}});
   spare_ = openSpare();
 }
 
@@ -71,9 +72,9 @@ bool ControlServer::serve(Caller& caller) {
   if (!caller.request.ends_with('\n'))
     return length != 0 && caller.request.size() < kMaxRequestBytes;
   try {
-    reply(caller.socket, answer_(nlohmann::json::parse(caller.request)));
+    sendReply(caller.socket, answer_(nlohmann::json::parse(caller.request)));
   } catch (const std::exception& error) {
-    reply(caller.socket, {{"error", error.what()}});
+    sendReply(caller.socket, {{"error", error.what()}});
   }
   return false;
 }

@@ -43,7 +43,7 @@ class ControlServer {
 
   Answer answer_;
   FileDescriptor listening_;
-  FileDescriptor spare_;  // its number serves to refuse a caller when there is no other
+  FileDescriptor spare_;  // closed to refuse a caller when no other descriptor is free
   std::vector<Caller> callers_;
 };
 

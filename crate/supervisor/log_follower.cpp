@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <fmt/format.h>
@@ -70,11 +71,13 @@ std::string LogFollower::takeLines() {
   while (::read(events_.get(), events.data(), events.size()) > 0) continue;
   std::string text;
   hasMore_ = false;
-  for (auto& [name, log] : logs_) {
-    readNew(name, log, text);
-    limit(log);
-  }
+  for (auto& [name, log] : logs_) readNew(name, log, text);
+  limit();
   return text;
+}
+
+void LogFollower::limit() {
+  for (auto& [name, log] : logs_) limit(log);
 }
 
 std::string LogFollower::prefix(const std::string& name) const {
@@ -128,7 +131,8 @@ void LogFollower::limit(Log& log) const {
   if (bytes <= static_cast<std::int64_t>(maxBytes_)) return;
   const auto removed = (status.st_size - bytes / 2) / kBlockBytes * kBlockBytes;
   if (removed == 0) return;
-  if (::fallocate(log.file.get(), FALLOC_FL_COLLAPSE_RANGE, 0, removed) == 0) log.offset -= removed;
+  if (::fallocate(log.file.get(), FALLOC_FL_COLLAPSE_RANGE, 0, removed) == 0)
+    log.offset = std::max<std::int64_t>(log.offset - removed, 0);
   else ::fallocate(log.file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, removed);
 }
 

@@ -48,6 +48,8 @@ class LogFollower {
   // Returns new lines, at most about a megabyte of each log; hasMore() tells whether others follow.
   // A line that is longer than 64 KiB comes in parts.
   [[nodiscard]] std::string takeLines();
+  // Shortens logs that are too long, as takeLines() does, but takes no lines.
+  void limit();
   [[nodiscard]] bool hasMore() const noexcept { return hasMore_; }
 
  private:

@@ -59,7 +59,7 @@ void Supervisor::run() {
   tryRecord();
   do {
     writeError(logs_.takeLines());
-  } while (logs_.hasMore());
+  } while (logs_.hasMore() && errors_.isEmpty());
   print(problems_.takeAll(Clock::nowNs()));
   ::unlink(folder_.file("control").c_str());
 }
@@ -278,6 +278,7 @@ void Supervisor::look() {
     for (auto& [backplane, watch] : watches_) watch.look();
     capsuleWriter_.look();
   });
+  logs_.limit();
   if (!isRecorded_) tryRecord();
   const auto now = Clock::nowNs();
   print(problems_.takeDue(now));
@@ -335,7 +336,7 @@ void Supervisor::tryRecord() {
 }
 
 int Supervisor::waitMs() const {
-  if (logs_.hasMore()) return 0;
+  if (logs_.hasMore() && errors_.isEmpty()) return 0;
   auto next = nextLookNs_;
   for (const auto& member : members_) {
     if (const auto time = member->service.nextActionNs()) next = std::min(next, *time);
@@ -348,7 +349,7 @@ int Supervisor::waitMs() const {
 
 void Supervisor::wait() {
   std::vector<pollfd> polled{{signals_.descriptor(), POLLIN, 0},
-                             {logs_.descriptor(), POLLIN, 0},
+                             {errors_.isEmpty() ? logs_.descriptor() : -1, POLLIN, 0},
                              {notify_.descriptor(), POLLIN, 0},
                              {errors_.descriptor(), POLLOUT, 0}};
   const auto firstAdopted = polled.size();
@@ -368,7 +369,8 @@ void Supervisor::wait() {
     if (polled[firstAdopted + i].revents != 0) handleEnd(*adopted[i], {});
   if (polled[0].revents != 0) handleSignals();
   control_.handle({polled.begin() + firstControl, polled.end()});
-  if (polled[1].revents != 0 || logs_.hasMore()) writeError(logs_.takeLines());
+  if (errors_.isEmpty() && (polled[1].revents != 0 || logs_.hasMore()))
+    writeError(logs_.takeLines());  // otherwise the lines wait in their files
   if (polled[2].revents != 0) takeReports();
   if (polled[3].revents != 0) errors_.flush();
   if (std::any_of(polled.begin() + firstWitness, polled.begin() + firstControl,

@@ -92,7 +92,7 @@ class Supervisor {
   Member* find(const std::string& name);
   Member& memberOf(const nlohmann::json& request);
 
-  ErrorQueue errors_;  // nobody has to read what the supervisor prints
+  ErrorQueue errors_;  // first, because constructors and destructors print, too
   CrateFolder folder_;
   std::function<Crate()> load_;
   Crate crate_;

@@ -6,6 +6,8 @@
 #include <fcntl.h>
 #include <sys/resource.h>
 
+#include <stdexcept>
+
 #include <mpf/file_descriptor.h>
 
 namespace mpf::test {
@@ -16,7 +18,8 @@ class NoDescriptors {
     ::getrlimit(RLIMIT_NOFILE, &before_);
     const FileDescriptor lowestFree(::open("/dev/null", O_RDONLY | O_CLOEXEC));
     const rlimit none{static_cast<rlim_t>(lowestFree.get()), before_.rlim_max};
-    ::setrlimit(RLIMIT_NOFILE, &none);
+    if (!lowestFree || ::setrlimit(RLIMIT_NOFILE, &none) != 0)
+      throw std::runtime_error("the number of descriptors cannot be limited");
   }
   ~NoDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
   NoDescriptors(const NoDescriptors&) = delete;

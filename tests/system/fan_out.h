@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the camera of fan_out_test.cpp publishes to fan_out_reader.cpp, and what readers report.
+// What the camera of fan_out_test.cpp publishes to fan_out_actor.cpp, and what readers report.
 #pragma once
 
 #include <algorithm>

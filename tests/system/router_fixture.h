@@ -26,7 +26,7 @@ namespace mpf::test {
 
 using namespace std::chrono_literals;
 
-// A router notices within, or not within, the pauses of a test that the other one is silent.
+// Dead times that are shorter, and longer, than the pauses of the tests.
 const RouterPair::Options kSoonDead{"--dead-time", "1s"};
 const RouterPair::Options kPatient{"--dead-time", "60s"};
 
