@@ -87,8 +87,8 @@ void ErrorQueue::flush() noexcept try {
   kept_ = fmt::format("{} lines are missing here: the reader of stderr was too slow\n", dropped_);
   dropped_ = 0;
   tryWriteKept();
-} catch (
-    const std::exception&) {  // NOLINT(bugprone-empty-catch): no memory; the next call tries again
+  // NOLINTNEXTLINE(bugprone-empty-catch): no memory; the next call tries again
+} catch (const std::exception&) {
 }
 
 void ErrorQueue::tryWriteKept() noexcept {

@@ -196,26 +196,26 @@ Proxy::Client* Proxy::tryFind(std::uint32_t number) {
 // Returns whether the reply ends its request.
 //   throws  ProtocolError: the peer must not send it now
 bool Proxy::checkReply(const Client& client, std::uint32_t requestId, bool isFirst) const {
-  const bool isOwed = awaits(client, requestId);
-  if (isFirst != isOwed) {
+  const bool endsRequest = awaits(client, requestId);
+  if (isFirst != endsRequest) {
     throw ProtocolError(FarewellCode::PROTOCOL,
                         fmt::format("a {} reply to request {} of client {}, which {}",
                                     isFirst ? "first" : "later", requestId, client.number,
-                                    isOwed ? "has had no first reply" : "is not pending"));
+                                    endsRequest ? "has had no first reply" : "is not pending"));
   }
   if (client.window.isUsedUp())
     throw ProtocolError(FarewellCode::LIMIT,
                         fmt::format("a reply to client {} beyond its window of {} bytes",
                                     client.number, client.window.bytes()));
-  return isOwed;
+  return endsRequest;
 }
 
 void Proxy::reply(PlainItem& item) {
   auto* const client = tryFind(item.client);
   if (client == nullptr || isDraining()) return;
-  const bool isOwed = checkReply(*client, item.requestId, item.isFirst);
+  const bool endsRequest = checkReply(*client, item.requestId, item.isFirst);
   client->window.received(windowBytesOf(item.message));
-  deliver(*client, item.requestId, std::move(item.message), isOwed);
+  deliver(*client, item.requestId, std::move(item.message), endsRequest);
 }
 
 void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
@@ -223,7 +223,7 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
   // The client has disconnected, or drain() has ended its requests.
   if (found == clients_.end() || isDraining()) return;
   auto& client = found->second;
-  const bool isOwed = checkReply(client, reply.getRequestId(), reply.getIsFirst());
+  const bool endsRequest = checkReply(client, reply.getRequestId(), reply.getIsFirst());
   ConversionError error;
   auto message = tryFromWire(
       reply.getMessage(), {static_cast<std::size_t>(connection_.line().limits().maxMessageBytes)},
@@ -238,7 +238,7 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
   }
   message->setRoute({0, 0, Message::missedFlags(reply.getMissed()), nullptr});
   client.window.received(windowBytesOf(*message));
-  deliver(client, reply.getRequestId(), std::move(*message), isOwed);
+  deliver(client, reply.getRequestId(), std::move(*message), endsRequest);
 }
 
 // The server has handled the request, but its reply cannot be delivered.
@@ -282,15 +282,16 @@ void Proxy::refuse(std::uint32_t number, const std::string& why) {
 }
 
 // Keeps the order: a message is queued behind those that are held.
-void Proxy::deliver(Client& client, std::uint32_t requestId, Message&& message, bool isOwed) {
-  if (client.held.empty() && tryDeliver(client, requestId, message, isOwed)) return;
+void Proxy::deliver(Client& client, std::uint32_t requestId, Message&& message, bool endsRequest) {
+  if (client.held.empty() && tryDeliver(client, requestId, message, endsRequest)) return;
   client.held.push_back({requestId, std::move(message)});
   retryAfter_ = kFirstRetry;
   retry_.setAt(Deadline::after(retryAfter_));
 }
 
 // Returns false when the client has no room for the message now.
-bool Proxy::tryDeliver(Client& client, std::uint32_t requestId, Message& message, bool isOwed) {
+bool Proxy::tryDeliver(Client& client, std::uint32_t requestId, Message& message,
+                       bool endsRequest) {
   const bool isConnectMessage = message.getType() == MessageType::connect;
   const bool isOurs = isConnectMessage || message.getType() == MessageType::requestFate;
   const auto bytes = windowBytesOf(message);
@@ -301,7 +302,7 @@ bool Proxy::tryDeliver(Client& client, std::uint32_t requestId, Message& message
     case ReplyResult::tooLarge:
       log_.warn("{} at location {}: a reply is larger than its client can receive", name_.server,
                 name_.location);
-      if (isOwed)
+      if (endsRequest)
         static_cast<void>(server_.replyTo(
             client.local, requestId,
             RequestFateMessage({.fate = Fate::outcomeUnknown, .requestId = requestId})));
@@ -310,7 +311,7 @@ bool Proxy::tryDeliver(Client& client, std::uint32_t requestId, Message& message
     case ReplyResult::clientGone:
       break;
   }
-  if (isOwed) ended(client);
+  if (endsRequest) ended(client);
   if (isConnectMessage) client.heldQueueFull = false;
   if (!isOurs) giveCredit(client, bytes);
   return true;

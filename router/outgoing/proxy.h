@@ -101,9 +101,8 @@ class Proxy final : private Polled {
   Client* tryFindOrOpen(std::uint64_t local);
   Client* tryFind(std::uint32_t number);
   bool checkReply(const Client& client, std::uint32_t requestId, bool isFirst) const;
-  // `isOwed`: the message ends the request.
-  void deliver(Client& client, std::uint32_t requestId, Message&& message, bool isOwed);
-  bool tryDeliver(Client& client, std::uint32_t requestId, Message& message, bool isOwed);
+  void deliver(Client& client, std::uint32_t requestId, Message&& message, bool endsRequest);
+  bool tryDeliver(Client& client, std::uint32_t requestId, Message& message, bool endsRequest);
   void giveCredit(Client& client, std::uint64_t bytes);
   [[nodiscard]] bool awaits(const Client& client, std::uint32_t requestId) const noexcept;
   void end(std::uint32_t number, std::uint32_t requestId, Fate fate);

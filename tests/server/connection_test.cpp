@@ -39,7 +39,7 @@ TEST(ConnectionTest, ClientsOfOneIndexHaveDifferentNumbers) {
   EXPECT_NE(former, 0u);
 }
 
-TEST(ConnectionTest, OwesARequestByItsFullId) {
+TEST(ConnectionTest, FindsAnUnansweredRequestByItsFullId) {
   const auto connection = Connection::take();
   connection->unanswered = std::vector<std::atomic<std::uint32_t>>(8);
   connection->unansweredMask = 7;

@@ -43,7 +43,7 @@ TEST_F(ConnectionsTest, AClosedConnectionIsReportedAndForgotten) {
   auto& link = createLink();
   auto& connection = accept(link);
   const auto client = connection.client();
-  const auto route = owe(connection, 3);
+  const auto route = noteRequest(connection, 3);
 
   connections_.close(connection);
 
@@ -68,11 +68,11 @@ TEST_F(ConnectionsTest, ARouteNamesOneClientAlthoughItsConnectionIsReused) {
   EXPECT_EQ(Connections::clientOf(route), present.client());
 }
 
-TEST_F(ConnectionsTest, ARequestWithoutReplyIsOwedToItsClient) {
+TEST_F(ConnectionsTest, ARequestWithoutReplyIsUnansweredForItsClient) {
   auto& connection = accept(createLink());
   const auto client = connection.client();
-  owe(connection, 3);
-  owe(connection, 5);
+  noteRequest(connection, 3);
+  noteRequest(connection, 5);
 
   EXPECT_TRUE(connections_.isUnanswered(client, 3));
   EXPECT_FALSE(connections_.isUnanswered(client, 4));

@@ -28,7 +28,7 @@ class PublisherTest : public ServerPartsTest {
     auto& link = createLink();
     auto& connection = accept(link);
     Int32Message request;
-    request.setRoute(owe(connection, requestId));
+    request.setRoute(noteRequest(connection, requestId));
     request.setClientExtra(static_cast<std::int32_t>(requestId) + 1);
     return {link, connection, std::move(request)};
   }
@@ -137,7 +137,7 @@ TEST_F(PublisherTest, AClientThatReturnsNothingGetsABoundedNumberAndIsToldWhatIt
 TEST_F(PublisherTest, EachRequestOfAClientIsToldItsOwnNumber) {
   auto subscriber = subscribe(7);
   Int32Message other;
-  other.setRoute(owe(subscriber.connection, 8));
+  other.setRoute(noteRequest(subscriber.connection, 8));
   for (int i = 0; i < kMaxBorrowed; ++i) ASSERT_EQ(publish(filled(0), other), ReplyResult::sent);
   for (int i = 0; i < 5; ++i)
     ASSERT_EQ(publish(filled(0), subscriber.request), ReplyResult::queueFull);

@@ -33,7 +33,7 @@ class ReplySenderTest : public ServerPartsTest {
 };
 
 TEST_F(ReplySenderTest, TheFirstReplyEndsTheRequest) {
-  const auto route = owe(connection_, 3);
+  const auto route = noteRequest(connection_, 3);
   auto first = replyTo(route);
   auto further = replyTo(route);
 
@@ -51,7 +51,7 @@ TEST_F(ReplySenderTest, TheFirstReplyEndsTheRequest) {
 }
 
 TEST_F(ReplySenderTest, CountsItsRepliesWhateverTheClientWrites) {
-  auto reply = replyTo(owe(connection_, 3));
+  auto reply = replyTo(noteRequest(connection_, 3));
   link_.control().serverSent.store(1000, std::memory_order_relaxed);
 
   EXPECT_EQ(replies_.send(reply), ReplyResult::sent);
@@ -61,7 +61,7 @@ TEST_F(ReplySenderTest, CountsItsRepliesWhateverTheClientWrites) {
 }
 
 TEST_F(ReplySenderTest, AReplyToAClientThatHasDisconnectedIsDropped) {
-  auto reply = replyTo(owe(connection_, 3));
+  auto reply = replyTo(noteRequest(connection_, 3));
   connections_.close(connection_);
 
   EXPECT_EQ(replies_.send(reply), ReplyResult::clientGone);
@@ -77,7 +77,7 @@ TEST_F(ReplySenderTest, AMessageWithoutARouteIsNoReply) {
 }
 
 TEST_F(ReplySenderTest, AReplyAboveTheLimitStaysWithItsOwner) {
-  const auto route = owe(connection_, 3);
+  const auto route = noteRequest(connection_, 3);
   auto reply = Char8ArrayMessage::allocValue((1 << 20) + 1);  // Offer::maxMessageBytes
   reply.setRoute(route);
 
@@ -90,7 +90,7 @@ TEST_F(ReplySenderTest, AReplyAboveTheLimitStaysWithItsOwner) {
 }
 
 TEST_F(ReplySenderTest, AFullQueueRefusesFurtherRepliesButNotTheFirst) {
-  const auto route = owe(connection_, 3);
+  const auto route = noteRequest(connection_, 3);
   const auto unowned = connection_.routeOf(4, nullptr);
   auto result = ReplyResult::sent;
   while (result == ReplyResult::sent) {
@@ -118,7 +118,7 @@ TEST_F(ReplySenderTest, TheTimeOfSendingIsThatOfTheAttemptThatSucceeds) {
 }
 
 TEST_F(ReplySenderTest, AnAbandonedRequestIsRefusedOnce) {
-  const auto route = owe(connection_, 3);
+  const auto route = noteRequest(connection_, 3);
 
   replies_.refuseAbandoned(route);
   replies_.refuseAbandoned(route);
@@ -129,7 +129,7 @@ TEST_F(ReplySenderTest, AnAbandonedRequestIsRefusedOnce) {
 }
 
 TEST_F(ReplySenderTest, AFateEndsTheRequest) {
-  owe(connection_, 3);
+  noteRequest(connection_, 3);
 
   replies_.sendFate(connection_, {.requestId = 3}, Fate::expired);
 
@@ -138,7 +138,7 @@ TEST_F(ReplySenderTest, AFateEndsTheRequest) {
 }
 
 TEST_F(ReplySenderTest, ALargeBodyIsInThePoolWhileTheClientIsConnected) {
-  const auto route = owe(connection_, 3);
+  const auto route = noteRequest(connection_, 3);
   const auto release = [](BodyBytes body) { body.lender->takeBack(body.data, body.capacity); };
 
   const auto shared = ReplySender::allocate(route, 10'000);

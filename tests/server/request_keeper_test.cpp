@@ -17,7 +17,7 @@ class RequestKeeperTest : public ServerPartsTest {
  protected:
   // A handle of a request that the server has taken.
   Int32Message request(std::uint32_t requestId) {
-    owe(connection_, requestId);
+    noteRequest(connection_, requestId);
     Int32Message message;
     message.setRoute(connection_.routeOf(requestId, &keeper_));
     return message;

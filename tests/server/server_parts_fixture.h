@@ -31,7 +31,7 @@ class ServerPartsTest : public ShmTest {
     return *connections_.all()[link.control().serverIndex.load(std::memory_order_relaxed)];
   }
   // The route of a request that the server has taken from this connection.
-  static Route owe(Connection& connection, std::uint32_t requestId) {
+  static Route noteRequest(Connection& connection, std::uint32_t requestId) {
     connection.placeOf(requestId).store(requestId, std::memory_order_relaxed);
     return connection.routeOf(requestId, nullptr);
   }

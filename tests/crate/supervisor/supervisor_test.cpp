@@ -3,8 +3,6 @@
 // killed.
 #include "crate/supervisor/supervisor.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -248,34 +246,6 @@ TEST_F(SupervisorTest, ContinuesWhileItsStateCannotBeRecorded) {
   std::filesystem::remove(blocked);
 
   waitForNew("int32", pid);
-}
-
-TEST_F(SupervisorTest, RestartsAProcessWhileItsOutputIsNotRead) {
-  const auto errors = files_.file("errors");
-  ASSERT_EQ(::mkfifo(errors.c_str(), 0600), 0);
-  const FileDescriptor full(::open(errors.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
-  while (::write(full.get(), "x", 1) == 1) continue;
-  write(kServer);
-  start({"/bin/bash", "-c",
-         std::string("exec ") + MPF + " run " + files_.file("lab.toml") + " 2>" + errors});
-  waitForState("int32", "ready");
-  const auto before = pidOf("int32");
-
-  ::kill(before, SIGKILL);
-
-  waitForNew("int32", before);
-  EXPECT_EQ(WEXITSTATUS(stop()), 0);
-}
-
-TEST_F(SupervisorTest, ContinuesWhenItsOutputHasNoReader) {
-  write(kServer);
-  // The reader of the pipe ends at once.
-  start({"/bin/bash", "-c",
-         std::string("exec ") + MPF + " run " + files_.file("lab.toml") + " 2> >(exec true)"});
-
-  waitForState("int32", "ready");
-
-  EXPECT_EQ(WEXITSTATUS(stop()), 0);
 }
 
 TEST_F(SupervisorTest, IsKilledAtRandomMomentsWithoutOrphansOrDoubles) {

@@ -38,9 +38,9 @@ TEST_F(DigitalIoModelTest, HasOnesInItsOutputsAtPowerUpAndZeroesElsewhere) {
   EXPECT_EQ(read(word::kOutput + 1), 0xff00);
   EXPECT_EQ(read(word::kInput), 0);
   EXPECT_EQ(read(word::kInput + 1), 0xff00);
-  for (const auto word : {6U, 9U, 11U, 13U}) EXPECT_EQ(read(word), 0) << word;
-  for (const auto word : {8U, 10U, 12U, 14U}) EXPECT_EQ(read(word), 0xff00) << word;
-  for (const auto word : {4U, 5U, 7U, 15U}) EXPECT_EQ(read(word), 0xffff) << word;
+  for (const auto one : {6U, 9U, 11U, 13U}) EXPECT_EQ(read(one), 0) << one;
+  for (const auto one : {8U, 10U, 12U, 14U}) EXPECT_EQ(read(one), 0xff00) << one;
+  for (const auto one : {4U, 5U, 7U, 15U}) EXPECT_EQ(read(one), 0xffff) << one;
 }
 
 TEST_F(DigitalIoModelTest, PullsALineDownByAZeroOnly) {

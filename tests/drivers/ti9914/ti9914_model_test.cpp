@@ -211,7 +211,7 @@ TEST_F(Ti9914ModelTest, HoldsOffAfterEnd) {
 
 TEST_F(Ti9914ModelTest, InterruptsForEnabledEventsWithAnOddVector) {
   write(kImr0, kBo);
-  write(kVector, 105);
+  write(ti9914::kVector, 105);
   takeCharge();
   EXPECT_FALSE(hasInterrupt());
   write(kCdor, '?');
@@ -219,20 +219,20 @@ TEST_F(Ti9914ModelTest, InterruptsForEnabledEventsWithAnOddVector) {
   EXPECT_EQ(read(kIsr0), kBo | kInt0);
   EXPECT_FALSE(hasInterrupt()) << "the read releases the line";
 
-  write(kVector, 104);
+  write(ti9914::kVector, 104);
   write(kCdor, '?');
   EXPECT_FALSE(hasInterrupt()) << "even vector";
-  write(kVector, 105);
+  write(ti9914::kVector, 105);
   EXPECT_TRUE(hasInterrupt());
   aux(kDai | kSet);
   EXPECT_FALSE(hasInterrupt());
   EXPECT_EQ(model_->vector(), 105);
-  EXPECT_EQ(read(kVector), 105);
+  EXPECT_EQ(read(ti9914::kVector), 105);
 }
 
 TEST_F(Ti9914ModelTest, ReportsAServiceRequestOnce) {
   takeCharge();
-  write(kVector, 105);
+  write(ti9914::kVector, 105);
   write(kImr1, ti9914::kSrq);
   bus_->access([&](const GpibLines& /*lines*/) { instrument_->requestService(0); });
 
@@ -260,7 +260,7 @@ TEST_F(Ti9914ModelTest, HasRegistersAtOddAddressesOfTheIoSpaceOnly) {
   EXPECT_EQ(io().read8(0x15), 0xff);
   EXPECT_EQ(carrier_.site(0).memory().read8(1), 0xff);
   io().write8(0x12, 7);
-  carrier_.site(0).memory().write8(kVector, 7);
+  carrier_.site(0).memory().write8(ti9914::kVector, 7);
   EXPECT_NE(model_->vector(), 7);
   EXPECT_EQ(readIdProm(carrier_.site(0).id(), "here").model, 0x14);
 }
