@@ -7,6 +7,7 @@
 #include <chrono>
 #include <functional>
 
+#include "tools/torture/checks.h"
 #include "tools/torture/echo.h"
 #include "tools/torture/sabotage.h"
 #include "tools/torture/talk.h"
@@ -63,8 +64,9 @@ int playSteady(const Cast& cast) {
 
 int playMortal(const Cast& cast) {
   Echo echo(Backplane::attach(cast.backplane), "mortal", cast.world, waitModeOf(cast.seed));
-  if (cast.sabotage == Sabotage::keepName) leaveChildBehind(cast.world, cast.backplane);
   auto& board = cast.world.mortal;
+  board.incarnation.store(incarnationOf(cast.backplane, "mortal"));
+  if (cast.sabotage == Sabotage::keepName) leaveChildBehind(cast.world, cast.backplane);
   echo.run(board, byDescriptor(cast.seed));
   board.isLeaving.store(1);
   return 0;

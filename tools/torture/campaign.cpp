@@ -12,7 +12,7 @@
 namespace mpf::torture {
 namespace {
 
-constexpr int kTries = 5;  // for a step that a process does not reach in every run
+constexpr int kTries = 20;  // for a step that a process does not reach in every run
 constexpr double kMaxInstructions = 5000;  // after a step
 
 std::atomic<bool>& interrupted() {

@@ -96,6 +96,11 @@ std::vector<std::string> staleSegments(const std::string& backplane, std::size_t
   return stale;
 }
 
+std::uint64_t incarnationOf(const std::string& backplane, const std::string& server) {
+  return ownerOf(SegmentName::serverWindow(backplane, 0, server),
+                 layout::SegmentKind::serverWindow);
+}
+
 void checkNoProtocolErrors(const std::string& backplane) {
   const auto snapshot = tools::Snapshot::take(backplane);
   for (const auto* windows : {&snapshot.servers, &snapshot.clients}) {

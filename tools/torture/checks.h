@@ -25,6 +25,8 @@ class Broken : public std::runtime_error {
 [[nodiscard]] std::vector<std::string> staleSegments(const std::string& backplane,
                                                      std::size_t links);
 
+// Incarnation of the window of the server with this name, at location 0; 0 if it has none.
+[[nodiscard]] std::uint64_t incarnationOf(const std::string& backplane, const std::string& server);
 // Throws Broken when a process of the backplane has counted protocol errors of a peer.
 void checkNoProtocolErrors(const std::string& backplane);
 // How many clients of the server with this name have died.

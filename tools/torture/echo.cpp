@@ -18,6 +18,7 @@ namespace mpf::torture {
 namespace {
 
 constexpr auto kBoardInterval = std::chrono::milliseconds(2);  // between two reads of the board
+constexpr int kMostAtOnce = 100;  // requests that are handled between two reads of the board
 constexpr std::uint32_t kNewEvery = 3;  // every third array gets a new message as its reply
 constexpr std::uint32_t kPublishEvery = 2;  // every second of these is published
 constexpr std::size_t kValues = 24;  // of an answer with many values: several runs
@@ -47,7 +48,7 @@ void Echo::run(const Board& board, bool byDescriptor) {
                              : server_.waitForMessage(Deadline::after(kBoardInterval));
     // Without a later request the kept one is never answered: dropping it refuses it.
     if (!isReady) kept_.reset();
-    handleAll();
+    for (auto most = kMostAtOnce; most != 0 && server_.handleOne(); --most) continue;
   }
 }
 

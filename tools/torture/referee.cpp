@@ -15,7 +15,7 @@ namespace {
 
 constexpr auto kPollInterval = std::chrono::microseconds(500);  // of the actors' reports
 constexpr std::uint64_t kEnough = 12;  // replies that show that a process continues
-constexpr std::uint64_t kLife = 40;  // replies to the survivor after which a server has run enough
+constexpr std::uint64_t kLife = 100;  // replies to the survivor after which a server has run enough
 constexpr std::size_t kLinksAtRest = 2;  // of the survivor, to both servers
 
 // How much more a process may hold than in its first rounds: for example a descriptor that it is
@@ -94,7 +94,6 @@ void Referee::layOutCorpse() {
 
 void Referee::startMortal() {
   (*world_).mortal.clear();
-  mortalReplies_ = repliesOf(1);
   mortal_ = processes_.start([cast = cast()] { return playMortal(cast); });
 }
 
@@ -206,16 +205,26 @@ void Referee::hold(Role role) {
   tracee_->release();
 }
 
+// Replies alone do not show that the survivor has the successor: replies of the dead server may
+// arrive late.
+void Referee::awaitSuccessor() {
+  const auto& server = (*world_).survivor.talked[1].server;
+  const auto& incarnation = (*world_).mortal.incarnation;
+  waitFor("the successor has the name of the dead server, and its client", [&] {
+    if (processes_.hasEnded(mortal_))
+      throw Broken("the successor could not open the name of the dead server");
+    return incarnation.load() != 0 && incarnation.load() == server.load();
+  });
+  const auto replies = repliesOf(1);
+  waitFor("the successor answers", [&] { return repliesOf(1) - replies >= kEnough; });
+}
+
 // Lets all actors rest and checks that everything holds.
 void Referee::settle() {
   auto& survivor = (*world_).survivor;
   const auto steadyReplies = repliesOf(0);
   waitFor("the survivors continue", [&] { return repliesOf(0) - steadyReplies >= kEnough; });
-  waitFor("the successor has the name of the dead server, and its client", [&] {
-    if (processes_.hasEnded(mortal_))
-      throw Broken("the successor could not open the name of the dead server");
-    return repliesOf(1) - mortalReplies_ >= kEnough;
-  });
+  awaitSuccessor();
   survivor.rest.store(1);
   waitFor("each request has an end", [&] { return survivor.isAtRest.load() != 0; });
   std::vector<std::string> stale;

@@ -94,6 +94,7 @@ class Referee {
   void checkOrderlyEnd(Role role) const;
   [[nodiscard]] bool isLifeDone(Role role) const;
   void settle();
+  void awaitSuccessor();
   void checkHoldings();
   void checkAlive() const;
   [[nodiscard]] Board& boardOf(Role role) const {
@@ -116,7 +117,7 @@ class Referee {
   pid_t companion_ = 0;  // the guest or the fleeting server of this round
   std::unique_ptr<Tracee> tracee_;
   bool wasThere_ = false;
-  std::uint64_t mortalReplies_ = 0;  // replies of mortal servers before this one started
+  std::uint64_t mortalReplies_ = 0;  // replies of mortal servers before the one under test
   std::uint64_t rounds_ = 0;
   std::map<pid_t, Holdings> heldAtStart_;
 };

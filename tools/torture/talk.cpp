@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <fmt/format.h>
 #include <thread>
 #include <utility>
@@ -21,6 +22,7 @@ constexpr const char* kNoRequest =
     "a reply or fate arrived for a request that had ended or was never sent";
 constexpr const char* kReusedId = "a request got the id of another request that is still open";
 constexpr std::size_t kBurst = 80;  // open requests whose replies fill the first ring
+constexpr auto kFull = std::chrono::milliseconds(2);  // longest time without room in a burst
 
 }  // namespace
 
@@ -50,12 +52,18 @@ void Talk::sendSome() {
   }
 }
 
-// Takes no replies meanwhile, so that the server moves to the second ring. The server takes
-// requests at its own pace, and may have died.
+// Takes no replies meanwhile, so that the server moves to the second ring. Gives up when the queue
+// stays full: the server may be stopped or dead, or belong to this thread.
 void Talk::sendBurst() {
-  for (auto tries = 10 * kBurst; tries != 0 && open_.size() < kBurst; --tries) {
-    if (!client_.isConnected()) return;
-    if (!sendOne()) std::this_thread::yield();
+  auto patience = Deadline::after(kFull);
+  while (open_.size() < kBurst && client_.isConnected()) {
+    if (sendOne()) {
+      patience = Deadline::after(kFull);
+    } else if (patience.hasPassed()) {
+      return;
+    } else {
+      std::this_thread::yield();
+    }
   }
 }
 
@@ -136,7 +144,7 @@ bool Talk::trySendDie() {
 }
 
 void Talk::take(const Message& message) {
-  if (const auto* connect = message.tryAs<Connect>()) return takeConnect(connect->status);
+  if (const auto* connect = message.tryAs<Connect>()) return takeConnect(*connect);
   const auto found = open_.find(message.route().requestId);
   if (found == open_.end()) return world_.complain(kNoRequest);
   const auto* fate = message.tryAs<RequestFate>();
@@ -186,9 +194,9 @@ void Talk::takeAnswers(std::span<const Int32> values) {
   }
 }
 
-void Talk::takeConnect(ConnectStatus status) {
-  if (status == ConnectStatus::connectYes) ++talked_.connects;
-  if (status != ConnectStatus::connectNo) return;
+void Talk::takeConnect(const Connect& connect) {
+  if (connect.status == ConnectStatus::connectYes) talked_.server.store(connect.incarnation);
+  if (connect.status != ConnectStatus::connectNo) return;
   if (!open_.empty())
     world_.complain(
         fmt::format("a disconnect was reported before the ends of {} requests", open_.size()));

@@ -52,7 +52,7 @@ class Talk {
   void takeValues(std::span<const Int32> values, const Message& first);
   void takeAnswers(std::span<const Int32> values);
   void takeFurther(std::span<const Int32> values);
-  void takeConnect(ConnectStatus status);
+  void takeConnect(const Connect& connect);
   void takeFate(std::int32_t value, Fate fate);
   void takeReply(std::int32_t value, const Message& reply);
   void takeNumber(std::int32_t value, std::int32_t answer);

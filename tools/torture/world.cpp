@@ -12,7 +12,7 @@ namespace mpf::torture {
 
 void Board::clear() noexcept {
   for (auto* word : {&rest, &leave, &isAtRest, &isLeaving}) word->store(0);
-  open.store(0);
+  for (auto* word : {&open, &incarnation}) word->store(0);
 }
 
 void World::complain(std::string_view text) noexcept {

@@ -16,10 +16,10 @@
 
 namespace mpf::torture {
 
-// Counts of what a client received from a server.
+// What a client received from servers of one name.
 struct Talked {
   std::atomic<std::uint64_t> replies{0};
-  std::atomic<std::uint64_t> connects{0};
+  std::atomic<std::uint64_t> server{0};  // incarnation of the last one that it connected to
   std::atomic<std::uint64_t> disconnects{0};
 };
 
@@ -32,6 +32,7 @@ struct Board {
   std::atomic<std::uint32_t> isAtRest{0};   // the actor sends nothing and has no open request
   std::atomic<std::uint32_t> isLeaving{0};  // the actor is exiting
   std::atomic<std::uint64_t> open{0};       // requests that have not ended
+  std::atomic<std::uint64_t> incarnation{0};  // of a server, once it is open
   std::array<Talked, 2> talked;             // with the steady server, with the mortal one
 
   // Resets the board for the next actor of this kind.

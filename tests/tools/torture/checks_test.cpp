@@ -99,6 +99,11 @@ TEST_F(TortureChecks, ALinkOfALivingServerIsStaleWithoutItsClient) {
   segments::remove(link);
 }
 
+TEST_F(TortureChecks, FindsTheIncarnationOfAServer) {
+  EXPECT_EQ(incarnationOf(name(), "dac"), window().header().incarnation);
+  EXPECT_EQ(incarnationOf(name(), "absent"), 0U);
+}
+
 TEST_F(TortureChecks, NamesTheProcessThatReceivedInvalidData) {
   EXPECT_NO_THROW(checkNoProtocolErrors(name()));
 

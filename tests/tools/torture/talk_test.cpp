@@ -9,6 +9,7 @@
 #include <string>
 
 #include "tests/tools/torture/talk_fixture.h"
+#include "tools/torture/checks.h"
 
 namespace mpf::torture {
 namespace {
@@ -62,7 +63,7 @@ TEST_F(TalkWithServer, AcceptsTheAnswersToItsRequests) {
   array->extra = answerTo(array->extra);
   send(std::move(array));
 
-  EXPECT_EQ(talked_.connects.load(), 1U);
+  EXPECT_EQ(talked_.server.load(), incarnationOf(backplane_.name(), "server"));
   EXPECT_EQ(complaint(), "");
 }
 
