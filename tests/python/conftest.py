@@ -10,8 +10,10 @@ import os
 import secrets
 import signal
 import subprocess
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 
@@ -29,6 +31,18 @@ may_fork_beside_threads = pytest.mark.skipif(
     reason="AddressSanitizer may hang after a fork beside other threads",
 )
 needs_mpf = pytest.mark.skipif(not HAS_MPF, reason="the program mpf was not built")
+
+
+T = TypeVar("T")
+
+
+def again_if_late(ask: Callable[[float], T], timeout: float, late: type[TimeoutError]) -> T:
+    """Asks again with a longer timeout when the server was too late, as on a busy host."""
+    while True:
+        try:
+            return ask(timeout)
+        except late:
+            timeout *= 2
 
 
 def pytest_sessionstart() -> None:
@@ -87,3 +101,34 @@ def doubler() -> Iterator[mpf.Server]:
 
     with server.start():
         yield server
+
+
+class Silent:
+    """A server that keeps its requests until the test ends them."""
+
+    def __init__(self) -> None:
+        self.server = mpf.Server("silent")
+        self.requests: list[mpf.Message] = []
+        self.came = threading.Semaphore(0)
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+
+    def _run(self) -> None:
+        while not self.server._take_interrupt():
+            request = self.server._receive(PATIENCE)
+            if request is not None:
+                self.requests.append(request)
+                self.came.release()
+
+    def close(self) -> None:
+        self.server.interrupt()
+        self.thread.join()
+        self.server.close()
+        self.requests.clear()
+
+
+@pytest.fixture
+def silent() -> Iterator[Silent]:
+    server = Silent()
+    yield server
+    server.close()

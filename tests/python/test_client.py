@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""mpf.Client: calls, exceptions, subscriptions, Ctrl-C."""
+"""mpf.Client: calls, exceptions, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import os
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
-from conftest import PATIENCE, PROGRAMS, needs_mpf
+from conftest import PATIENCE, PROGRAMS, Silent, again_if_late, needs_mpf
 
 import mpf
 
@@ -83,45 +83,14 @@ def test_a_reply_of_another_type_is_an_error_unless_it_is_expected(doubler: mpf.
     assert isinstance(anything, mpf.Int32)
 
 
-class Silent:
-    """A server that keeps its requests until the test ends them."""
-
-    def __init__(self) -> None:
-        self.server = mpf.Server("silent")
-        self.requests: list[mpf.Message] = []
-        self.came = threading.Semaphore(0)
-        self.thread = threading.Thread(target=self._run)
-        self.thread.start()
-
-    def _run(self) -> None:
-        while not self.server._take_interrupt():
-            request = self.server._receive(PATIENCE)
-            if request is not None:
-                self.requests.append(request)
-                self.came.release()
-
-    def close(self) -> None:
-        self.server.interrupt()
-        self.thread.join()
-        self.server.close()
-        self.requests.clear()
-
-
-@pytest.fixture
-def silent() -> Iterator[Silent]:
-    server = Silent()
-    yield server
-    server.close()
-
-
 def test_a_request_that_was_taken_and_has_no_reply_times_out(silent: Silent) -> None:
     with mpf.Client("silent", timeout=PATIENCE) as client:
-        request = client.send(mpf.Int32(), timeout=0.2)
-        assert silent.came.acquire(timeout=PATIENCE)
+        assert client.wait_connected(PATIENCE)
 
         with pytest.raises(mpf.TimedOut, match="may have acted") as caught:
-            request.wait()
+            again_if_late(lambda timeout: client.call(mpf.Int32(), timeout), 0.2, mpf.Expired)
 
+    assert silent.came.acquire(timeout=PATIENCE)
     assert isinstance(caught.value, (mpf.OutcomeUnknown, TimeoutError))
     assert caught.value.fate == "outcomeUnknown"
 
@@ -253,102 +222,6 @@ def test_a_closed_client_raises(doubler: mpf.Server) -> None:
 
     with pytest.raises(mpf.Error, match="the client is closed"):
         client.int32()
-
-
-def test_a_subscription_iterates_over_all_replies(doubler: mpf.Server) -> None:
-    @doubler.on(mpf.Float64)
-    def count(request: mpf.Float64) -> Iterator[float]:
-        yield from map(float, range(int(request.value)))
-
-    with mpf.Client("doubler") as client, client.subscribe(mpf.Float64(5.0)) as replies:
-        values = [next(replies).value for _ in range(5)]
-
-    assert values == [0.0, 1.0, 2.0, 3.0, 4.0]
-    assert replies.missed == 0
-
-
-def test_a_subscription_may_have_replies_of_another_class(doubler: mpf.Server) -> None:
-    @doubler.on(mpf.Char8Array)
-    def count(request: mpf.Char8Array) -> Iterator[mpf.Float64]:
-        yield from (mpf.Float64(number) for number in range(2))
-
-    with mpf.Client("doubler", timeout=PATIENCE) as client:
-        with client.subscribe(mpf.Char8Array("count"), reply=mpf.Float64) as replies:
-            assert [next(replies).value for _ in range(2)] == [0.0, 1.0]
-        with pytest.raises(mpf.UnexpectedReply):
-            next(client.subscribe(mpf.Char8Array("count")))
-
-
-def test_a_subscription_counts_what_the_program_did_not_take(doubler: mpf.Server) -> None:
-    @doubler.on(mpf.Float64)
-    def count(request: mpf.Float64) -> Iterator[float]:
-        yield from map(float, range(10))
-
-    with mpf.Client("doubler", timeout=PATIENCE) as client:
-        replies = client.subscribe(mpf.Float64(), limit=3)
-        first = next(replies).value
-        client.int32()  # behind the further replies
-        while replies.missed < 6:
-            client.int32()
-        rest = [next(replies).value for _ in range(3)]
-
-    assert (first, rest) == (0.0, [7.0, 8.0, 9.0])
-
-
-def test_a_subscription_is_renewed_when_the_server_starts_again() -> None:
-    def serve() -> mpf.Server:
-        server = mpf.Server("source")
-        server.on(mpf.Int32)(lambda request: (number for number in (1, 2)))
-        return server.start()
-
-    first = serve()
-    with mpf.Client("source", timeout=PATIENCE) as client, client.subscribe(mpf.Int32()) as replies:
-        before = [next(replies).value, next(replies).value]
-        first.close()
-        with serve():
-            after = [next(replies).value, next(replies).value]
-
-    assert before == after == [1, 2]
-
-
-def test_a_subscription_without_renewal_ends_with_the_server() -> None:
-    server = mpf.Server("source")
-    server.on(mpf.Int32)(lambda request: 1)
-    server.start()
-    with mpf.Client("source", timeout=PATIENCE) as client:
-        replies = client.subscribe(mpf.Int32(), renew=False)
-        next(replies)
-        server.close()
-
-        assert list(replies) == []
-
-
-def test_a_subscription_times_out(doubler: mpf.Server) -> None:
-    with mpf.Client("doubler", timeout=PATIENCE) as client:
-        replies = client.subscribe(mpf.Int32(), timeout=0.05)
-        next(replies)
-
-        with pytest.raises(TimeoutError):
-            next(replies)
-
-
-def test_a_subscription_whose_first_reply_is_late_times_out(silent: Silent) -> None:
-    with mpf.Client("silent", timeout=PATIENCE) as client, pytest.raises(TimeoutError):
-        assert client.wait_connected(PATIENCE)
-        next(client.subscribe(mpf.Int32(), timeout=0.5))
-
-
-def test_a_subscription_that_the_server_refuses_ends(silent: Silent) -> None:
-    def refuse() -> None:
-        assert silent.came.acquire(timeout=PATIENCE)
-        silent.server.refuse(silent.requests[0])
-
-    thread = threading.Thread(target=refuse)
-    thread.start()
-    with mpf.Client("silent", timeout=PATIENCE) as client, pytest.raises(mpf.Refused):
-        next(client.subscribe(mpf.Int32()))
-    thread.join()
-    assert len(silent.requests) == 1
 
 
 def test_ctrl_c_ends_a_subscription(doubler: mpf.Server) -> None:

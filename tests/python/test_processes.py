@@ -101,7 +101,7 @@ def silent() -> Iterator[mpf.Server]:
 @pytest.mark.parametrize("ending", ENDS)
 def test_a_program_may_end_while(ending: str, silent: mpf.Server, backplane: str) -> None:
     lines = [line.removeprefix(8 * " ") for line in ENDS[ending].splitlines()]
-    start = 'import sys, threading, mpf\nclient = mpf.Client("silent")\n'
+    start = f'import sys, threading, mpf\nclient = mpf.Client("silent", timeout={PATIENCE})\n'
     assert run(start + "\n".join(lines) + '\nprint("end")\n', backplane) == "end\n" or (
         "sys.exit" in ENDS[ending]
     )
@@ -109,7 +109,7 @@ def test_a_program_may_end_while(ending: str, silent: mpf.Server, backplane: str
 
 FORKS = """
 import os, sys, threading, mpf
-client = mpf.Client("doubler", wait="block")
+client = mpf.Client("doubler", timeout=PATIENCE, wait="block")
 busy = threading.Thread(target=lambda: [client.int32(1) for _ in range(2000)])
 busy.start()
 for _ in range(20):
@@ -143,11 +143,11 @@ def test_multiprocessing_works(method: str, doubler: mpf.Server, tmp_path: Path)
 import multiprocessing, mpf
 
 def ask(value):
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout={PATIENCE}) as client:
         return client.int32(value).value
 
 if __name__ == "__main__":
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout={PATIENCE}) as client:
         client.int32(1)
         with multiprocessing.get_context("{method}").Pool(2) as pool:
             assert pool.map(ask, range(10)) == [2 * value for value in range(10)]

@@ -23,7 +23,10 @@ def test_many_requests_are_sent_in_order(doubler: mpf.Server) -> None:
 @pytest.fixture
 def short() -> Iterator[tuple[mpf.Server, mpf.Client]]:
     """A server with room for five requests, which does not run, and a client of it."""
-    with mpf.Server("short", queue_size=5) as server, mpf.Client("short") as client:
+    with (
+        mpf.Server("short", queue_size=5) as server,
+        mpf.Client("short", timeout=PATIENCE) as client,
+    ):
         server.on(mpf.Message)(lambda request: None)
         while not client.wait_connected(0.01):
             server._receive(0)

@@ -24,8 +24,10 @@ class ServiceRequestWatchTest : public testing::Test {
   std::atomic<int> looks_{0};
   std::atomic<int> calls_{0};
   ServiceRequestWatch watch_{[this] {
+                               const auto seen =
+                                   isBusy_ ? std::nullopt : std::optional(isActive_.load());
                                ++looks_;
-                               return isBusy_ ? std::nullopt : std::optional(isActive_.load());
+                               return seen;
                              },
                              1ms};
 };
@@ -82,8 +84,8 @@ TEST_F(ServiceRequestWatchTest, AReportedLineIsLookedAtWhileItIsActive) {
   watch_.report();
 
   waitFor(calls_, 3);
-  isActive_ = false;
   const int looks = looks_;
+  isActive_ = false;
   waitFor(looks_, looks + 1);  // the look that finds it inactive
 }
 

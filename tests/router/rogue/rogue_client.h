@@ -12,7 +12,7 @@ namespace mpf::test {
 
 class RogueClientTest : public RogueTest {
  protected:
-  explicit RogueClientTest(std::string deadTime = "5s") : deadTime_(std::move(deadTime)) {}
+  explicit RogueClientTest(std::string deadTime = "60s") : deadTime_(std::move(deadTime)) {}
 
   void SetUp() override {
     startAll({"--dead-time", deadTime_, "--max-clients", "20", "--max-message-size", "1MiB",

@@ -56,6 +56,8 @@ Bytes nestedFrame(const std::function<Fill(const FillMessage&)>& carry, std::uin
 template <class Fixture>
 class RogueInputTest : public Fixture {
  protected:
+  using Fixture::Fixture;
+
   // Measures the router after it has served a rogue that follows the protocol.
   void SetUp() override {
     Fixture::SetUp();
@@ -169,21 +171,29 @@ TYPED_TEST(RogueInputTest, DeeplyNestedIsCut) {
   }
 }
 
+// A router that soon takes a silent peer for dead.
+template <class Fixture>
+class RogueSilenceTest : public RogueInputTest<Fixture> {
+ protected:
+  RogueSilenceTest() : RogueInputTest<Fixture>("5s") {}
+};
+TYPED_TEST_SUITE(RogueSilenceTest, BothRoles, Roles);
+
 // A few bytes at a time, and never a whole frame.
-TYPED_TEST(RogueInputTest, SlowDripIsCut) {
+TYPED_TEST(RogueSilenceTest, SlowDripIsCut) {
   const auto frame = frameOf(std::vector<Fill>(1000, ping(1)));
   EXPECT_THAT(this->stranger().drip(frame), HasSubstr("code = silence"));
   EXPECT_THAT(this->greeted().drip(frame), HasSubstr("code = silence"));
   this->expectHonestWork();
 }
 
-TYPED_TEST(RogueInputTest, SilenceIsCut) {
+TYPED_TEST(RogueSilenceTest, SilenceIsCut) {
   EXPECT_THAT(this->stranger().farewell(), HasSubstr("code = silence"));
   EXPECT_THAT(this->greeted().farewell(), HasSubstr("code = silence"));
   this->expectHonestWork();
 }
 
-TYPED_TEST(RogueInputTest, ThatReadsNothingIsCut) {
+TYPED_TEST(RogueSilenceTest, ReadingNothingIsCut) {
   auto peer = this->greeted();
   const auto pings = frameOf(std::vector<Fill>(10'000, ping(1)));
 

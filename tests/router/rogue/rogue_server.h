@@ -19,7 +19,7 @@ class RogueServerTest : public RogueTest {
  protected:
   static constexpr std::int32_t kRogueLocation = 2;
 
-  explicit RogueServerTest(std::string deadTime = "5s") : deadTime_(std::move(deadTime)) {}
+  explicit RogueServerTest(std::string deadTime = "60s") : deadTime_(std::move(deadTime)) {}
 
   void SetUp() override {
     startAll({},
