@@ -68,6 +68,13 @@ int rank(NameKind kind) {
   return kind == NameKind::bulk ? 2 : 1;
 }
 
+// The window of a server; an empty view if it has no window.
+tools::WindowView viewOf(const std::string& backplane, const std::string& server) {
+  const auto snapshot = tools::Snapshot::take(backplane);
+  const auto found = std::ranges::find(snapshot.servers, server, &tools::WindowView::name);
+  return found == snapshot.servers.end() ? tools::WindowView() : *found;
+}
+
 // The number after a word in a file of /proc; 0 when the word is missing.
 std::size_t numberIn(const std::string& path, const std::string& word) {
   std::ifstream file(path);
@@ -111,10 +118,13 @@ void checkNoProtocolErrors(const std::string& backplane) {
   }
 }
 
+std::uint64_t openLinks(const std::string& backplane, const std::string& server) {
+  const auto window = viewOf(backplane, server);
+  return window.linksOpened - window.linksClosed;
+}
+
 std::uint64_t clientsDied(const std::string& backplane, const std::string& server) {
-  const auto snapshot = tools::Snapshot::take(backplane);
-  const auto found = std::ranges::find(snapshot.servers, server, &tools::WindowView::name);
-  return found == snapshot.servers.end() ? 0 : found->peersDied;
+  return viewOf(backplane, server).peersDied;
 }
 
 Holdings Holdings::of(pid_t pid) {

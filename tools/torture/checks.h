@@ -29,6 +29,8 @@ class Broken : public std::runtime_error {
 [[nodiscard]] std::uint64_t incarnationOf(const std::string& backplane, const std::string& server);
 // Throws Broken when a process of the backplane has counted protocol errors of a peer.
 void checkNoProtocolErrors(const std::string& backplane);
+// Links that the server with this name has not closed.
+[[nodiscard]] std::uint64_t openLinks(const std::string& backplane, const std::string& server);
 // How many clients of the server with this name have died.
 [[nodiscard]] std::uint64_t clientsDied(const std::string& backplane, const std::string& server);
 

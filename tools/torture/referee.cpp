@@ -236,6 +236,9 @@ void Referee::settle() {
   } catch (const Broken& broken) {
     throw Broken(fmt::format("{}; still there: {}", broken.what(), fmt::join(stale, ", ")));
   }
+  // A death that it notices later would count in the next round.
+  waitFor("the surviving server has closed the links of others than the survivor",
+          [&] { return openLinks(backplane_.name(), "steady") == 1; });
   checkNoProtocolErrors(backplane_.name());
   checkHoldings();
   survivor.rest.store(0);

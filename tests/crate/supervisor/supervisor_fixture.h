@@ -4,7 +4,9 @@
 
 #include <signal.h>
 
+#include <chrono>
 #include <cstdlib>
+#include <fmt/format.h>
 #include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -79,11 +81,17 @@ class SupervisorTest : public testing::Test {
   }
   // Waits until the process is ready with another pid.
   void waitForNew(const std::string& name, pid_t before) {
-    while (stateOf(name) != "ready" || pidOf(name) == before) continue;
+    for (;;) {
+      const auto now = process(name);
+      const pid_t pid = now.value("pid", 0);
+      if (now.value("state", "absent") == "ready" && pid != 0 && pid != before) return;
+    }
   }
-  // Sends an Int32 message, and returns whether the server has replied.
-  bool isReplying(const std::string& server) {
-    return mpf::test::runCommand(std::string(MPF) + " call " + server + " int32 value=1 2>&1")
+  // Sends an Int32 message, and returns whether the server has replied within this time.
+  bool isReplying(const std::string& server,
+                  std::chrono::seconds patience = std::chrono::hours(1)) {
+    return mpf::test::runCommand(fmt::format("{} call {} int32 value=1 --timeout {} 2>&1", MPF,
+                                             server, patience.count()))
                .status == 0;
   }
   CrateFolder folder() { return CrateFolder::of("lab"); }

@@ -113,6 +113,17 @@ TEST_F(TortureChecks, NamesTheProcessThatReceivedInvalidData) {
             "dac received invalid data from a peer");
 }
 
+TEST_F(TortureChecks, CountsTheLinksThatAServerHasNotClosed) {
+  EXPECT_EQ(openLinks(name(), "dac"), 0U);
+  {
+    MessageClient client(*dispatcher_, [](const Message&) {});
+    connect(client);
+    EXPECT_EQ(openLinks(name(), "dac"), 1U);
+  }
+  while (openLinks(name(), "dac") != 0) server_->handleOne();
+  EXPECT_EQ(openLinks(name(), "another"), 0U);
+}
+
 TEST_F(TortureChecks, CountsTheClientsThatDied) {
   controlOf(window()).peersDied.store(3);
 

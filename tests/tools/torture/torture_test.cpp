@@ -136,7 +136,7 @@ TEST_P(MistakeTest, IsFound) {
   GTEST_SKIP() << "AddressSanitizer makes every step slower than the patience of this test allows";
 #endif
   const auto ended = torture({"--break", GetParam().name, "--patience", GetParam().patience,
-                              "--step", "window_closed", "--duration", "200"});
+                              "--step", "window_closed", "--duration", "1000000"});
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.out, AllOf(HasSubstr("\nfailed: "), HasSubstr(GetParam().complaint)));
