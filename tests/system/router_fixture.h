@@ -27,7 +27,7 @@ namespace mpf::test {
 using namespace std::chrono_literals;
 
 // Dead times that are shorter, and longer, than the pauses of the tests.
-const RouterPair::Options kSoonDead{"--dead-time", "1s"};
+const RouterPair::Options kSoonDead{"--dead-time", "3s"};
 const RouterPair::Options kPatient{"--dead-time", "60s"};
 
 class RouterTest : public testing::Test {
