@@ -88,7 +88,9 @@ def test_a_request_that_was_taken_and_has_no_reply_times_out(silent: Silent) -> 
         assert client.wait_connected(PATIENCE)
 
         with pytest.raises(mpf.TimedOut, match="may have acted") as caught:
-            again_if_late(lambda timeout: client.call(mpf.Int32(), timeout), 0.2, mpf.Expired)
+            again_if_late(
+                lambda timeout: client.send(mpf.Int32(), timeout=timeout).wait(), 0.2, mpf.Expired
+            )
 
     assert silent.came.acquire(timeout=PATIENCE)
     assert isinstance(caught.value, (mpf.OutcomeUnknown, TimeoutError))

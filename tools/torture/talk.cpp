@@ -22,7 +22,7 @@ constexpr const char* kNoRequest =
     "a reply or fate arrived for a request that had ended or was never sent";
 constexpr const char* kReusedId = "a request got the id of another request that is still open";
 constexpr std::size_t kBurst = 80;  // open requests whose replies fill the first ring
-constexpr auto kFull = std::chrono::milliseconds(2);  // longest time without room in a burst
+constexpr auto kPatience = std::chrono::milliseconds(2);  // longest time without room in a burst
 
 }  // namespace
 
@@ -55,10 +55,10 @@ void Talk::sendSome() {
 // Takes no replies meanwhile, so that the server moves to the second ring. Gives up when the queue
 // stays full: the server may be stopped or dead, or belong to this thread.
 void Talk::sendBurst() {
-  auto patience = Deadline::after(kFull);
+  auto patience = Deadline::after(kPatience);
   while (open_.size() < kBurst && client_.isConnected()) {
     if (sendOne()) {
-      patience = Deadline::after(kFull);
+      patience = Deadline::after(kPatience);
     } else if (patience.hasPassed()) {
       return;
     } else {

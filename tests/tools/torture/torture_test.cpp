@@ -135,6 +135,7 @@ TEST_P(MistakeTest, IsFound) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer makes every step slower than the patience of this test allows";
 #endif
+  // It ends at the complaint; the duration is no limit.
   const auto ended = torture({"--break", GetParam().name, "--patience", GetParam().patience,
                               "--step", "window_closed", "--duration", "1000000"});
 
