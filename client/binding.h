@@ -24,11 +24,10 @@
 #include "client/dispatcher_parts.h"
 #include "client/nudge_interval.h"
 #include "client/request_sender.h"
+#include "client/run_receiver.h"
 #include "client/value_handler.h"
 
 namespace mpf {
-
-class ValueRun;
 
 class Binding final : public LinkUser, public std::enable_shared_from_this<Binding> {
  public:
@@ -44,6 +43,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   SendResult sendAs(std::uint32_t requestId, Message& message, Deadline takeBefore) noexcept {
     return sender_.sendAs(requestId, message, takeBefore);
   }
+  std::size_t sendAs(const MessageRun& run) noexcept { return sender_.sendAs(run); }
   SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
                     std::span<std::uint32_t> requestIds) noexcept {
     return sender_.sendMany(messages, takeBefore, requestIds);
@@ -62,6 +62,8 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   void setServer(const std::string& server, std::int32_t location);
   //   throws  std::logic_error after setServer(), and for a second handler
   void setValueHandler(ValueHandler handler);
+  // Call it before setServer().
+  void setRunReceiver(RunReceiver& receiver) noexcept { runs_ = &receiver; }
   bool waitConnected(Deadline deadline) {
     return connector_.wait(deadline, [this] { return isConnected(); });
   }
@@ -146,10 +148,12 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   void noteTimes(std::uint32_t sentTick, const Request* request) noexcept;
   void deliver(Message&& message);
   void deliverValues(const Message& first);
+  bool tryDeliverRun(const Message& first);
   void takeFurtherReplies(const Message& first, ValueRun& run) noexcept;
   void takeFirstReplies(const Message& first, ValueRun& run) noexcept;
-  template <class Accept>
-  void takeValues(ValueRun& run, const Accept& accept) noexcept;
+  template <class Run, class Accept>
+  void takeRun(Run& run, std::size_t most, const Accept& accept) noexcept;
+  bool tryEndRequest(const EnvelopeWords& reply) noexcept;
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   void deliverFate(const UntakenRequest& request, Fate fate);
@@ -173,6 +177,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   NudgeInterval nudgeInterval_;
   bool isPaused_ = false;
   ValueHandler values_;  // written before bind()
+  RunReceiver* runs_ = nullptr;  // likewise; nullptr: all replies are delivered one by one
   End end_;  // in the states ending and interrupted, and at the end in the state left
 };
 

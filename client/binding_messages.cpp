@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Binding: takes the messages of the server and delivers them.
+#include <algorithm>
 #include <array>
 #include <cstring>
 
 #include "base/step.h"
 #include "client/binding.h"
 #include "shm/histogram.h"
-#include "shm/messages/value_run.h"
+#include "shm/messages/message_run.h"
 
 namespace mpf {
 namespace {
@@ -162,7 +163,7 @@ void Binding::deliver(Message&& message) try {
   if (hasLeft()) return;
   if (message.getType() == values_.type && message.isSound()) {
     deliverValues(message);
-  } else {
+  } else if (runs_ == nullptr || !tryDeliverRun(message)) {
     callback_(std::move(message));
   }
 } catch (...) {
@@ -190,7 +191,7 @@ void Binding::deliver(Message&& message) try {
 // Takes the values after `first` that are further replies to the same request.
 void Binding::takeFurtherReplies(const Message& first, ValueRun& run) noexcept {
   const auto like = wordsOf(first, 0);
-  takeValues(run, [&](const EnvelopeWords& words) {
+  takeRun(run, ValueRun::kMost, [&](const EnvelopeWords& words) {
     if (words.body != like.body || words.request != like.request || !words.hasMarksOf(like))
       return false;
     if (words.sentTick() != 0) noteTimes(words.sentTick(), nullptr);
@@ -201,22 +202,54 @@ void Binding::takeFurtherReplies(const Message& first, ValueRun& run) noexcept {
 // Takes the values after `first` that are first replies to other requests, and ends these.
 void Binding::takeFirstReplies(const Message& first, ValueRun& run) noexcept {
   const auto like = wordsOf(first, layout::kSlotFirstReply);
-  takeValues(run, [&](const EnvelopeWords& words) {
-    if (words.body != like.body || !words.hasMarksOf(like)) return false;
-    auto* const request = sender_.requests()->find(words.requestId());
-    if (request == nullptr || request->isGivenUp) return false;
-    if (words.sentTick() != 0 || request->sentNs != 0) noteTimes(words.sentTick(), request);
-    // Ended before the next message is looked at, which may name the same request.
-    endRequest(*request);
-    return true;
+  takeRun(run, ValueRun::kMost, [&](const EnvelopeWords& words) {
+    return words.body == like.body && words.hasMarksOf(like) && tryEndRequest(words);
   });
 }
 
-template <class Accept>
-void Binding::takeValues(ValueRun& run, const Accept& accept) noexcept {
+// Delivers `first` together with the replies behind it: all are first replies to their requests, or
+// none is. Returns false, and has delivered nothing, if `first` is alone.
+bool Binding::tryDeliverRun(const Message& first) {
+  if (!MessageRun::canHave(first.getType()) || first.body().size() != layout::kFirstSlotBodyBytes ||
+      first.getMissed() != 0)
+    return false;
+  const auto most = std::min(runs_->room(), MessageRun::kMost);
+  if (most < 2) return false;
+  const bool areFirst = (first.route().flags & kEndsRequest) != 0;
+  MessageRun run(first.getType(), areFirst ? layout::kSlotFirstReply : std::uint8_t{0});
+  run.add(wordsOf(first, 0));
+  run.add(FirstBody::of(first.body().data()));
+  takeRun(run, most, [&](const EnvelopeWords& words) {
+    if (!run.accepts(words)) return false;
+    if (areFirst) {
+      if (!tryEndRequest(words)) return false;
+    } else if (words.sentTick() != 0) {
+      noteTimes(words.sentTick(), nullptr);
+    }
+    run.add(words);
+    return true;
+  });
+  if (run.size() == 1) return false;
+  runs_->onRun(run, areFirst);
+  return true;
+}
+
+// Takes messages behind the first one of `run`, as long as there are fewer than `most`.
+template <class Run, class Accept>
+void Binding::takeRun(Run& run, std::size_t most, const Accept& accept) noexcept {
   const auto taken = channel().link().incoming().takeRun(
-      ValueRun::kMost - 1, accept, [&](const FirstBody& body) { run.add(body); });
+      most - 1, accept, [&](const FirstBody& body) { run.add(body); });
   count(control().received, taken);
+}
+
+// Ends the request of a first reply that is taken in a run. Returns false if it has had a fate.
+bool Binding::tryEndRequest(const EnvelopeWords& reply) noexcept {
+  auto* const request = sender_.requests()->find(reply.requestId());
+  if (request == nullptr || request->isGivenUp) return false;
+  if (reply.sentTick() != 0 || request->sentNs != 0) noteTimes(reply.sentTick(), request);
+  // Ended before the next message is looked at, which may name the same request.
+  endRequest(*request);
+  return true;
 }
 
 }  // namespace mpf

@@ -11,6 +11,12 @@ SendResult RelayClient::sendAs(std::uint32_t requestId, Message&& message,
   return binding_->sendAs(requestId, message, takeBefore);
 }
 
+std::size_t RelayClient::sendAs(const MessageRun& run) noexcept {
+  return isInherited() ? 0 : binding_->sendAs(run);
+}
+
+void RelayClient::setRunReceiver(RunReceiver& receiver) { binding_->setRunReceiver(receiver); }
+
 void RelayClient::pause() { binding_->pause(); }
 void RelayClient::resume() { binding_->resume(); }
 

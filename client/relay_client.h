@@ -6,6 +6,8 @@
 
 #include <mpf/message_client.h>
 
+#include "client/run_receiver.h"
+
 namespace mpf {
 
 class RelayClient : public MessageClient {
@@ -16,6 +18,12 @@ class RelayClient : public MessageClient {
   // another request occupies the place of that number in the table of requests.
   [[nodiscard]] SendResult sendAs(std::uint32_t requestId, Message&& message,
                                   Deadline takeBefore) noexcept;
+  // The same for a run of requests without deadlines. Returns how many were sent; the others may be
+  // sent one by one, which says why they are refused.
+  [[nodiscard]] std::size_t sendAs(const MessageRun& run) noexcept;
+  // `receiver`, which outlives this object, gets consecutive replies together. Replies that come
+  // alone and all other messages go to the callback of the constructor. Call it before bind().
+  void setRunReceiver(RunReceiver& receiver);
   // Whether a message that the callback received ended its request.
   [[nodiscard]] static bool endsRequest(const Message& message) noexcept {
     return (message.route().flags & kEndsRequest) != 0;

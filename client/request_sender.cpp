@@ -2,6 +2,7 @@
 #include "client/request_sender.h"
 
 #include <algorithm>
+#include <array>
 #include <new>
 #include <utility>
 
@@ -130,6 +131,14 @@ SendResult RequestSender::sendAs(std::uint32_t requestId, Message& message,
   return sendOutOfLine(message, nsOf(takeBefore), requestId, nullptr, Turn::last);
 }
 
+std::size_t RequestSender::sendAs(const MessageRun& run) noexcept {
+  const auto sendAll = [&](std::size_t) {
+    const auto count = sendLocked(run);
+    return SentMany{count, count == run.size() ? SendResult::sent : SendResult::queueFull};
+  };
+  return sendInBatch(run.size(), 0, sendAll).count;
+}
+
 SendResult RequestSender::sendWithCopy(Message& message, std::int64_t deadlineNs,
                                        std::uint32_t* requestId) noexcept {
   auto copy = tryCopy(message);
@@ -255,6 +264,47 @@ std::size_t RequestSender::sendRunLocked(const Bodies& bodies, std::int64_t dead
       link.trySendRun(words, bodies.first(most).all, {link.header().queueSize, 0}, noteSent);
   if (count != 0) isFullReported_ = false;
   return count;
+}
+
+// Sends the first requests of `run`, as many as there is room for, under their own numbers. All are
+// added to the table before, because the ring asks for an envelope only when it has room for it.
+std::size_t RequestSender::sendLocked(const MessageRun& run) noexcept {
+  auto& link = channel_->link();
+  if (link.maxMessageBytes() < layout::kFirstSlotBodyBytes) return 0;
+  std::array<Request*, MessageRun::kMost> added;
+  std::size_t count = 0;
+  while (count < run.size()) {
+    auto id = run[count].requestId();
+    auto* const request = requests_->tryReserve(id);
+    if (request == nullptr) break;
+    request->clientType = run[count].clientType();
+    request->clientExtra = run[count].clientExtra();
+    request->ordinal = link.outgoing().messages() + 1 + count;
+    request->deadlineNs = 0;
+    request->sentNs = 0;
+    requests_->add(*request, id);
+    added[count++] = request;
+  }
+  MPF_STEP(request_added);
+  std::size_t sent = 0;
+  const auto body = EnvelopeWords::fullSlot(static_cast<std::uint16_t>(run.type()), 0);
+  const auto words = [&](std::size_t index, std::int64_t sentNs) {
+    if (index == 0) added[sent]->sentNs = sentNs;
+    const auto& given = run[sent + index];
+    return EnvelopeWords{body, given.request, given.clientWith(Tick::ofSample(sentNs)), 0};
+  };
+  const auto noteSent = [&clientSent = link.control().clientSent](std::uint64_t messages) {
+    clientSent.store(messages, std::memory_order_relaxed);
+  };
+  while (sent < count) {
+    const auto rest = run.values(sent, count - sent);
+    const auto next = link.trySendRun(words, rest, {link.header().queueSize, 0}, noteSent);
+    if (next == 0) break;
+    sent += next;
+  }
+  for (auto at = sent; at < count; ++at) static_cast<void>(requests_->takeBack(*added[at]));
+  if (sent != 0) isFullReported_ = false;
+  return sent;
 }
 
 // Without the lock, after messages were sent.

@@ -18,6 +18,7 @@
 #include "client/request_table.h"
 #include "client/untaken_requests.h"
 #include "shm/messages/message_link.h"
+#include "shm/messages/message_run.h"
 #include "shm/messages/value_run.h"
 
 namespace mpf {
@@ -40,6 +41,7 @@ class RequestSender {
                   Retry retry) noexcept;
   // As RelayClient::sendAs().
   SendResult sendAs(std::uint32_t requestId, Message& message, Deadline takeBefore) noexcept;
+  std::size_t sendAs(const MessageRun& run) noexcept;
   // As MessageClient::sendMany(), of messages and of values.
   SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
                     std::span<std::uint32_t> requestIds) noexcept;
@@ -96,6 +98,7 @@ class RequestSender {
   template <class SendNext>
   SentMany sendInBatch(std::size_t count, std::int64_t deadlineNs,
                        const SendNext& sendNext) noexcept;
+  std::size_t sendLocked(const MessageRun& run) noexcept;
   SentMany sendNextLocked(const Bodies& bodies, std::int64_t deadlineNs,
                           std::span<std::uint32_t> requestIds) noexcept;
   std::size_t sendRunLocked(const Bodies& bodies, std::int64_t deadlineNs,

@@ -22,6 +22,18 @@ ReplyResult RelayServer::replyTo(std::uint64_t client, std::uint32_t requestId, 
   if (message) message.setRoute(own);
   return result;
 }
+Message RelayServer::receive(MessageRun& run, std::uint64_t& client, std::size_t most) {
+  return core_->receiveOrTakeRun(run, client, most);
+}
+void RelayServer::refuse(std::uint64_t client, const MessageRun& run) noexcept {
+  const auto route = core_->connections().routeTo(client, 0);
+  if (route.link == 0) return;
+  core_->replies().refuse(Connection::of(route), route.flags, run, 0);
+}
+std::size_t RelayServer::replyTo(std::uint64_t client, const MessageRun& run,
+                                 bool isFirst) noexcept {
+  return core_->replies().sendRun(core_->connections().routeTo(client, 0), run, isFirst);
+}
 bool RelayServer::isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept {
   return core_->connections().isUnanswered(client, requestId);
 }

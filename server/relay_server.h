@@ -8,11 +8,14 @@
 
 #include <mpf/message_server.h>
 
+#include "shm/messages/message_run.h"
+
 namespace mpf {
 
 class RelayServer : public MessageServer {
  public:
   using MessageServer::MessageServer;
+  using MessageServer::receive;
 
   // Sets a callback for clients that connect (isConnected true) and disconnect or die (false).
   // receive() calls it. Set it before the first receive(). When it throws, receive() finishes its
@@ -29,6 +32,19 @@ class RelayServer : public MessageServer {
   // not become readable for requests. After a change to false, call receive() until it returns an
   // empty handle.
   void setPolled(bool isPolled) noexcept;
+  // As receive(). If the next requests of a client have no deadline, are of the same type, and this
+  // type may be in a run, takes up to `most` of them into `run`, sets `client`, which was 0, and
+  // returns an empty handle. The caller ends these requests, as if it had kept the results of
+  // clientOf() and requestId; `run` is empty if the client has sent invalid data.
+  //   throws  as receive()
+  [[nodiscard]] Message receive(MessageRun& run, std::uint64_t& client, std::size_t most);
+  // Ends requests of a run that was received as `refused`.
+  void refuse(std::uint64_t client, const MessageRun& run) noexcept;
+  // As replyTo(), with several replies: all are first replies to one request each, or none is.
+  // Stops at one of which this is not true, or for which there is no room. Returns how many were
+  // sent.
+  [[nodiscard]] std::size_t replyTo(std::uint64_t client, const MessageRun& run,
+                                    bool isFirst) noexcept;
   // Whether that request still has no reply.
   [[nodiscard]] bool isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept;
   // The requests of a client that were received and still have no reply.

@@ -141,45 +141,61 @@ void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& req
 }
 
 void ReplySender::sendRun(Connection& connection, std::uint32_t generation,
-                          RequestRun& run) noexcept {
+                          const MessageRun& run) noexcept {
   if (connection.isInherited()) return;
   std::size_t sent = 0;
   {
     const BiasedLock::Guard lock(*connection.lock);
     // The handler may have received further requests, and closed the connection.
     if (connection.generation != generation || !connection.channel) return;
-    sent = sendRunLocked(connection, run);
+    sent = sendRunLocked(connection, run, run.size(), true);
   }
   if (sent < run.size()) refuse(connection, generation, run, sent);
 }
 
-// Returns the number of replies; less than that of requests only if the client has sent more than
-// it may.
-std::size_t ReplySender::sendRunLocked(Connection& connection, RequestRun& run) noexcept {
+std::size_t ReplySender::sendRun(const Route& route, const MessageRun& run, bool isFirst) noexcept {
+  if (route.link == 0) return 0;
+  auto& connection = Connection::of(route);
+  if (connection.isInherited()) return 0;
+  const BiasedLock::Guard lock(*connection.lock);
+  if (!connection.isOpenFor(route) ||
+      connection.channel->link().maxMessageBytes() < layout::kFirstSlotBodyBytes)
+    return 0;
+  std::size_t count = 0;
+  while (count < run.size() && connection.isUnanswered(run[count].requestId()) == isFirst) ++count;
+  return sendRunLocked(connection, run, count, isFirst);
+}
+
+// Sends the first `count` messages of a run. Returns the number of replies. There is room for all
+// first replies, unless the client has sent more requests than it may.
+std::size_t ReplySender::sendRunLocked(Connection& connection, const MessageRun& run,
+                                       std::size_t count, bool isFirst) noexcept {
   auto& link = connection.channel->link();
   const auto stamp = stamps_ ? static_cast<std::uint64_t>(Clock::wallNs()) : 0;
-  const auto body =
-      EnvelopeWords::fullSlot(static_cast<std::uint16_t>(run.type()), layout::kSlotFirstReply);
+  const auto body = EnvelopeWords::fullSlot(static_cast<std::uint16_t>(run.type()),
+                                            isFirst ? layout::kSlotFirstReply : std::uint8_t{0});
   std::size_t sent = 0;
   const auto words = [&](std::size_t index, std::int64_t sentNs) {
-    const auto& request = run[sent + index];
-    return EnvelopeWords{body, request.request, request.clientWith(Tick::ofSample(sentNs)), stamp};
+    const auto& given = run[sent + index];
+    return EnvelopeWords{body, given.request, given.clientWith(Tick::ofSample(sentNs)),
+                         given.timeNs != 0 ? given.timeNs : stamp};
   };
   const Link::Batch batch(link);
-  while (sent < run.size()) {
-    const auto rest = run.values().subspan(sent * layout::kFirstSlotBodyBytes);
-    const auto count = link.trySendRun(words, rest, {}, noteSent(link));
-    if (count == 0) break;
-    sent += count;
+  while (sent < count) {
+    const Link::Limits limits{0, isFirst ? 0 : link.slotsOfFirstReplies()};
+    const auto next =
+        link.trySendRun(words, run.values(sent, count - sent), limits, noteSent(link));
+    if (next == 0) break;
+    sent += next;
   }
-  for (std::size_t index = 0; index < sent; ++index) {
+  for (std::size_t index = 0; isFirst && index < sent; ++index) {
     connection.noteFirstReply(run[index].requestId(), counts_);
   }
   counts_.sent(sent);
   return sent;
 }
 
-void ReplySender::refuse(Connection& connection, std::uint32_t generation, const RequestRun& run,
+void ReplySender::refuse(Connection& connection, std::uint32_t generation, const MessageRun& run,
                          std::size_t index) noexcept {
   for (; index < run.size(); ++index)
     refuseAbandoned({reinterpret_cast<std::uint64_t>(&connection), run[index].requestId(),

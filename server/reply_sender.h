@@ -14,8 +14,8 @@
 
 #include "server/connection.h"
 #include "server/reply_counts.h"
-#include "server/request_run.h"
 #include "shm/fork_guard.h"
+#include "shm/messages/message_run.h"
 
 namespace mpf {
 
@@ -31,9 +31,11 @@ class ReplySender {
   RepliedMany sendBodies(const Message& request, const Bodies& bodies) noexcept;
   // Sends the values of `run` as the replies to its requests. `generation`: of the connection when
   // they were taken.
-  void sendRun(Connection& connection, std::uint32_t generation, RequestRun& run) noexcept;
+  void sendRun(Connection& connection, std::uint32_t generation, const MessageRun& run) noexcept;
+  // As RelayServer::replyTo(), with a run.
+  std::size_t sendRun(const Route& route, const MessageRun& run, bool isFirst) noexcept;
   // Ends those from `index` on with the fate `refused`.
-  void refuse(Connection& connection, std::uint32_t generation, const RequestRun& run,
+  void refuse(Connection& connection, std::uint32_t generation, const MessageRun& run,
               std::size_t index) noexcept;
   // Ends a request of `connection` with a fate.
   void sendFate(Connection& connection, RequestMarks request, Fate fate) noexcept;
@@ -48,7 +50,8 @@ class ReplySender {
   static BodyBytes tryAllocateInPool(const Route& route, std::size_t bytes) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   RepliedMany sendRun(const Message& request, const Bodies& bodies) noexcept;
-  std::size_t sendRunLocked(Connection& connection, RequestRun& run) noexcept;
+  std::size_t sendRunLocked(Connection& connection, const MessageRun& run, std::size_t count,
+                            bool isFirst) noexcept;
   void sendFullSlotsLocked(Connection& connection, const Message& request, const Bodies& bodies,
                            RepliedMany& sent) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;

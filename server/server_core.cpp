@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/server_core.h"
 
+#include <algorithm>
 #include <cstring>
 #include <fmt/format.h>
 #include <stdexcept>
@@ -182,6 +183,19 @@ Message ServerCore::receiveOrHandleRun(bool& hasHandledRun) {
       [&](Connection& connection) { return hasHandledRun = tryHandleRun(connection); });
 }
 
+Message ServerCore::receiveOrTakeRun(MessageRun& run, std::uint64_t& client, std::size_t most) {
+  return receiveUnless([&](Connection& connection) {
+    auto& ring = connection.channel->link().incoming();
+    const auto type = static_cast<MessageType>(ring.nextType());
+    if (most < 2 || !MessageRun::canHave(type) || !ring.hasSecond()) return false;
+    const auto number = connection.client();
+    run.begin(type);
+    if (!tryTakeRun(connection, run, most)) return false;
+    client = number;
+    return true;
+  });
+}
+
 // Returns an empty handle when no request waits, or when `tryHandle(connection)` has handled one.
 template <class TryHandle>
 [[gnu::always_inline]] inline Message ServerCore::receiveUnless(const TryHandle& tryHandle) {
@@ -226,18 +240,9 @@ template <class TryHandle>
 }
 
 bool ServerCore::tryHandleRun(Connection& connection, MessageType type, const HandleRun& handle) {
-  auto& link = connection.channel->link();
-  if (link.maxMessageBytes() < layout::kFirstSlotBodyBytes) return false;
-  RequestRun run(type);
-  link.incoming().takeRun(
-      ValueRun::kMost, [&](const EnvelopeWords& words) { return run.tryAdd(words); },
-      [&](const FirstBody& body) { run.add(body); });
-  if (run.size() == 0) return false;
-  endpoint_.countTurns(static_cast<std::uint32_t>(run.size() - 1));
-  if (!tryNoteTaken(connection, run)) return true;
-  std::int32_t cmd = 0;
-  std::memcpy(&cmd, run.values().data() + layout::kCmdOffset, sizeof cmd);
-  progress_.begin(type, cmd);
+  MessageRun run(type);
+  if (!tryTakeRun(connection, run, MessageRun::kMost)) return false;
+  if (run.size() == 0) return true;
   const auto generation = connection.generation;
   try {
     callHandler([&] { handle(run.values()); });
@@ -249,9 +254,33 @@ bool ServerCore::tryHandleRun(Connection& connection, MessageType type, const Ha
   return true;
 }
 
+// Takes up to `most` requests without a deadline of the type of `run`. Returns false if there is
+// none. If the id of a request is invalid, closes the connection and leaves the run empty.
+bool ServerCore::tryTakeRun(Connection& connection, MessageRun& run, std::size_t most) noexcept {
+  auto& link = connection.channel->link();
+  if (link.maxMessageBytes() < layout::kFirstSlotBodyBytes) return false;
+  const auto accept = [&](const EnvelopeWords& words) {
+    if (!run.accepts(words) || words.timeNs != 0) return false;
+    run.add(words);
+    return true;
+  };
+  link.incoming().takeRun(std::min(most, MessageRun::kMost), accept,
+                          [&](const FirstBody& body) { run.add(body); });
+  if (run.size() == 0) return false;
+  endpoint_.countTurns(static_cast<std::uint32_t>(run.size() - 1));
+  if (!tryNoteTaken(connection, run)) {
+    run.begin(run.type());
+    return true;
+  }
+  std::int32_t cmd = 0;
+  std::memcpy(&cmd, run.values().data() + layout::kCmdOffset, sizeof cmd);
+  progress_.begin(run.type(), cmd);
+  return true;
+}
+
 // Returns false, and has closed the connection, if the id of a request is invalid. The service time
 // of a run is that of the first request that says when it was sent.
-bool ServerCore::tryNoteTaken(Connection& connection, const RequestRun& run) noexcept {
+bool ServerCore::tryNoteTaken(Connection& connection, const MessageRun& run) noexcept {
   count(endpoint_.control().received, run.size());
   std::size_t timed = run.size();
   for (std::size_t index = run.size(); index-- != 0;) {

@@ -28,8 +28,8 @@
 #include "server/reply_counts.h"
 #include "server/reply_sender.h"
 #include "server/request_keeper.h"
-#include "server/request_run.h"
 #include "shm/endpoint.h"
+#include "shm/messages/message_run.h"
 
 namespace mpf {
 
@@ -54,6 +54,8 @@ class ServerCore {
   // replies, and returns an empty handle.
   //   throws  what the handler throws, and as receive()
   Message receiveOrHandleRun(bool& hasHandledRun);
+  // As RelayServer::receive() with a run.
+  Message receiveOrTakeRun(MessageRun& run, std::uint64_t& client, std::size_t most);
   // Calls a handler. The other requests wait if it throws.
   template <class Handle>
   void callHandler(const Handle& handle) try {
@@ -96,7 +98,8 @@ class ServerCore {
   bool hasRequest(Connection& connection) noexcept;
   bool tryHandleRun(Connection& connection);
   bool tryHandleRun(Connection& connection, MessageType type, const HandleRun& handle);
-  bool tryNoteTaken(Connection& connection, const RequestRun& run) noexcept;
+  bool tryTakeRun(Connection& connection, MessageRun& run, std::size_t most) noexcept;
+  bool tryNoteTaken(Connection& connection, const MessageRun& run) noexcept;
   bool tryBegin(Connection& connection, Envelope& envelope) noexcept;
   Message finishShort(Connection& connection, const Envelope& envelope) noexcept;
   struct Times {

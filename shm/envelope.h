@@ -110,6 +110,12 @@ struct EnvelopeWords {
     return of({.type = type, .flags = flags}, 1, layout::kFirstSlotBodyBytes).body;
   }
   [[nodiscard]] std::uint32_t requestId() const noexcept { return detail::firstOf(request); }
+  [[nodiscard]] std::int32_t clientType() const noexcept {
+    return static_cast<std::int32_t>(detail::secondOf(request));
+  }
+  [[nodiscard]] std::int32_t clientExtra() const noexcept {
+    return static_cast<std::int32_t>(detail::firstOf(client));
+  }
   [[nodiscard]] std::uint32_t sentTick() const noexcept { return detail::secondOf(client); }
   // The word `client` with another tick.
   [[nodiscard]] std::uint64_t clientWith(std::uint32_t tick) const noexcept {

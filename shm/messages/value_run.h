@@ -36,10 +36,14 @@ class ValueRun {
  public:
   static constexpr std::size_t kMost = 16;
 
+  void clear() noexcept { count_ = 0; }
   void add(const FirstBody& body) noexcept { body.copyTo(values_[count_++].data()); }
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
   [[nodiscard]] std::span<std::byte> bytes() noexcept {
     return std::as_writable_bytes(std::span(values_).first(count_));
+  }
+  [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
+    return std::as_bytes(std::span(values_).first(count_));
   }
 
  private:

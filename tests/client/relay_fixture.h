@@ -11,8 +11,8 @@ namespace mpf::test {
 
 class RelayTest : public ClientTest {
  protected:
-  RelayServer& startWatched() {
-    auto& server = startServer({.queueSize = 4});
+  RelayServer& startWatched(int queueSize = 4) {
+    auto& server = startServer({.queueSize = queueSize});
     server.onClient(
         [this](std::uint64_t client, bool isThere) { comings_.emplace_back(client, isThere); });
     serverRuns_ = false;
