@@ -68,7 +68,7 @@ struct Allow {
 
 struct Limits {
   // Messages of one connection that may wait to be sent (`queueSize` of the old MPF).
-  std::uint32_t queueSize = 100;
+  std::uint32_t queueSize = 256;
   // Size up to which waiting messages share a frame (`bufSize` of the old MPF).
   std::uint32_t bufferBytes = 1u << 20;
   std::uint64_t maxMessageBytes = std::uint64_t{64} << 20;

@@ -237,7 +237,7 @@ security = "plain"
   EXPECT_THAT(
       started.out,
       HasSubstr(
-          "\nlimits      queue-size 100 buffer-size 1MiB max-message-size 64MiB window-size 4MiB "
+          "\nlimits      queue-size 256 buffer-size 1MiB max-message-size 64MiB window-size 4MiB "
           "max-clients 16000 "
           "max-connections 1000 dead-time 2s handshake-time 5s first-retry 100ms last-retry 5s\n"));
 }

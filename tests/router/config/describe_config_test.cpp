@@ -32,7 +32,7 @@ TEST(DescribeConfig, HasALineForEachPart) {
             "allows      * to bind to serial*, dac at location 1, 3\n"
             "allows      * to bind to * at all locations\n"
             "connects    [fd00::7]:9901, plain TCP, for location 2\n"
-            "limits      queue-size 100 buffer-size 1MiB max-message-size 64MiB window-size 4MiB "
+            "limits      queue-size 256 buffer-size 1MiB max-message-size 64MiB window-size 4MiB "
             "max-clients 16000 max-connections 1000 dead-time 2s handshake-time 5s "
             "first-retry 100ms last-retry 5s\n");
 }
