@@ -15,7 +15,9 @@ FarClient::FarClient(const Shared& shared, const Terms& terms)
       window_(fullWindow()),
       held_(terms.queueSize, shared.heldBytes),
       client_(std::in_place, shared.dispatcher,
-              [this](Message&& message) { onMessage(std::move(message)); }) {}
+              [this](Message&& message) { onMessage(std::move(message)); }) {
+  client_->setRunReceiver(*this);
+}
 
 std::int64_t FarClient::fullWindow() const noexcept {
   return std::max<std::int64_t>(terms_.window, 1);
@@ -36,6 +38,14 @@ void FarClient::request(PlainItem& item) {
   if (state_ == State::gaveUp) return endRequest(item.requestId, fateAfterGiveUp_, giveUpReason_);
   if (isConnected()) return send(item.requestId, item.message, Deadline::never());
   hold({item.requestId, Deadline::never(), std::move(item.message)});
+}
+
+void FarClient::request(const PlainItems& items) {
+  std::size_t sent = isConnected() ? client_->sendAs(items.run) : 0;
+  for (; sent < items.run.size(); ++sent) {
+    auto item = items[sent];
+    request(item);
+  }
 }
 
 void FarClient::request(wire::Request::Reader request) {
@@ -127,14 +137,30 @@ void FarClient::onMessage(Message&& message) {
   if (window_ <= 0) return drop(requestId, isFirst, message.getMissed());
   const auto missed = takeDropped(requestId) + message.getMissed();
   message.setRoute({0, requestId, Message::missedFlags(missed), nullptr});
-  window_ -= windowBytesOf(message);
-  if (window_ <= 0 && state_ != State::draining) client_->pause();
+  useWindow(windowBytesOf(message));
   if (PlainItem::canCarry(message))
     return shared_.line.send(PlainOutgoing{false, isFirst, terms_.number, requestId, message});
   shared_.line.send(Carried{.isFirst = isFirst,
                             .client = terms_.number,
                             .requestId = requestId,
                             .message = std::move(message)});
+}
+
+void FarClient::useWindow(std::int64_t bytes) {
+  window_ -= bytes;
+  if (window_ <= 0 && state_ != State::draining) client_->pause();
+}
+
+// The last reply may exceed the window.
+std::size_t FarClient::room() const noexcept {
+  if (window_ <= 0 || !dropped_.empty()) return 0;
+  const auto inWindow = static_cast<std::size_t>((window_ - 1) / kWindowBytesBeside + 1);
+  return std::min(inWindow, shared_.line.room());
+}
+
+void FarClient::onRun(const MessageRun& run, bool areFirst) {
+  useWindow(static_cast<std::int64_t>(run.size() * kWindowBytesBeside));
+  shared_.line.send(PlainItems{false, areFirst, terms_.number, run});
 }
 
 //   missed  further replies that the server has dropped before this one

@@ -31,7 +31,7 @@
 
 namespace mpf::router {
 
-class FarClient {
+class FarClient final : private RunReceiver {
  public:
   // What a client reports to the object that made it.
   struct Events {
@@ -68,6 +68,7 @@ class FarClient {
   //   throws  ProtocolError
   void request(wire::Request::Reader request);
   void request(PlainItem& item);
+  void request(const PlainItems& items);
   void credit(std::uint32_t bytes);
   // The server is gone: receives the messages that it had sent, drops those beyond the window, and
   // then receives the disconnect.
@@ -82,13 +83,16 @@ class FarClient {
   }
 
  private:
-  enum class State {
+  enum class State : std::uint8_t {
     waiting,  // requests are held
     connected,  // requests go to the server
     draining,  // the server is gone: the messages that it had sent are received
     gaveUp,  // requests end with fateAfterGiveUp_
   };
   void onMessage(Message&& message);
+  [[nodiscard]] std::size_t room() const noexcept override;
+  void onRun(const MessageRun& run, bool areFirst) override;
+  void useWindow(std::int64_t bytes);
   void drop(std::uint32_t requestId, bool isFirst, std::uint32_t missed);
   [[nodiscard]] std::uint32_t takeDropped(std::uint32_t requestId);
   void onConnect(const Connect& connect);
@@ -110,8 +114,8 @@ class FarClient {
   const Shared& shared_;
   Terms terms_;
   State state_ = State::waiting;
-  Fate fateAfterGiveUp_{};
   bool queueFullSent_ = false;  // in this run of refused requests
+  Fate fateAfterGiveUp_{};
   std::int64_t window_;  // bytes of replies that may be sent before the next credit
   std::string giveUpReason_;
   HeldRequests held_;

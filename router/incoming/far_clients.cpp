@@ -10,8 +10,6 @@
 namespace mpf::router {
 namespace {
 
-// Batches of messages that the dispatcher runs between two looks at the line and the clock.
-constexpr int kBatches = 8;
 // The time for the dispatcher before the event loop runs its other tasks.
 constexpr std::chrono::milliseconds kDispatcherTurn{1};
 
@@ -106,8 +104,7 @@ void FarClients::run() {
   if (!dispatcher_ || !line_.hasRoom()) return;
   const auto end = Deadline::after(kDispatcherTurn);
   bool isDrained = false;
-  while (!isDrained && !end.hasPassed() && line_.hasRoom())
-    isDrained = dispatcher_->runPending(kBatches);
+  while (!isDrained && !end.hasPassed() && line_.hasRoom()) isDrained = dispatcher_->runPending(1);
   dropped_.clear();
   if (!isDrained && line_.hasRoom()) return timer_.setAt(Deadline::after(Nanoseconds(0)));
   scheduleRun();

@@ -81,6 +81,13 @@ void LocalServers::handle(PlainItem& item) {
   else endWithoutClient(item.client, item.requestId);
 }
 
+void LocalServers::handle(const PlainItems& items) {
+  if (!items.isRequest) refuseServersItem();
+  if (auto* client = clients_.find(items.client)) return client->request(items);
+  for (std::size_t at = 0; at < items.run.size(); ++at)
+    endWithoutClient(items.client, items.run[at].requestId());
+}
+
 // ---- bindings
 
 void LocalServers::onBind(wire::Bind::Reader bind) {

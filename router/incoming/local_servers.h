@@ -40,6 +40,7 @@ class LocalServers {
   //   throws  ProtocolError
   void handle(wire::Item::Reader item);
   void handle(PlainItem& item);
+  void handle(const PlainItems& items);
   // Receives messages of the servers while the line has room.
   void run() { clients_.run(); }
   void onTraffic() { clients_.onTraffic(); }

@@ -26,6 +26,7 @@ Line::Events ServerRouter::lineEvents() {
       .onGreeting = [this](const PeerGreeting& greeting) { onGreeting(greeting); },
       .onItem = [this](wire::Item::Reader item) { servers_.handle(item); },
       .onPlain = [this](PlainItem& item) { servers_.handle(item); },
+      .onPlainItems = [this](const PlainItems& items) { servers_.handle(items); },
       .onRoom = [this] { servers_.run(); },
       .onTraffic = [this] { servers_.onTraffic(); },
       .onHandled = [this] { context_.lookForAnswers(); },

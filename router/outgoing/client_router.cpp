@@ -72,6 +72,7 @@ kj::Promise<LineEnd> ClientRouter::runLine(kj::Own<kj::AsyncIoStream> stream) {
           .onGreeting = [this](const PeerGreeting& greeting) { onGreeting(greeting); },
           .onItem = [this](wire::Item::Reader item) { servers_.handle(item); },
           .onPlain = [this](PlainItem& item) { servers_.handle(item); },
+          .onPlainItems = [this](const PlainItems& items) { servers_.handle(items); },
           .onRoom = [this] { servers_.pump(); },
           .onTraffic = [this] { context_.noteTraffic(); },
           .onHandled = [this] { context_.lookForAnswers(); },

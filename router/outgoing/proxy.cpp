@@ -103,14 +103,21 @@ bool Proxy::pump(int most) {
   if (isDraining()) return false;
   state_ = State::ready;
   bool hasTaken = false;
-  for (; most != 0 && connection_.line().hasRoom(); --most) {
-    auto request = server_.receive();
-    if (!request) {
+  while (most > 0 && connection_.line().hasRoom()) {
+    std::uint64_t local = 0;
+    auto request = server_.receive(run_, local, connection_.line().room());
+    if (!request && local == 0) {
       state_ = State::idle;
       break;
     }
     hasTaken = true;
-    forward(std::move(request));
+    if (request) {
+      forward(std::move(request));
+      --most;
+    } else {
+      forward(local, run_);
+      most -= static_cast<int>(run_.size());
+    }
   }
   if (hasTaken) context_.poll(*this);
   return hasMore();
@@ -156,6 +163,18 @@ void Proxy::forward(Message request) {
                                   .message = std::move(request)});
 }
 
+void Proxy::forward(std::uint64_t local, const MessageRun& requests) {
+  auto* const client = tryFindSender(local);
+  if (client == nullptr) return server_.refuse(local, requests);
+  const auto number = static_cast<std::uint32_t>(requests.size());
+  client->unanswered += number;
+  unanswered_ += number;
+  if (!client->refusal)
+    return connection_.line().send(PlainItems{true, false, client->number, requests});
+  for (std::size_t at = 0; at < requests.size(); ++at)
+    endRequest(client->number, requests[at].requestId(), Fate::refused, client->refusal->why);
+}
+
 void Proxy::drain(Fate fate) {
   if (isDraining()) return;
   state_ = State::draining;
@@ -182,9 +201,9 @@ bool Proxy::awaits(const Client& client, std::uint32_t requestId) const noexcept
                               [&](const Held& held) { return held.requestId == requestId; });
 }
 
-void Proxy::ended(Client& client) noexcept {
-  --client.unanswered;
-  --unanswered_;
+void Proxy::ended(Client& client, std::uint32_t requests) noexcept {
+  client.unanswered -= requests;
+  unanswered_ -= requests;
 }
 
 Proxy::Client* Proxy::tryFind(std::uint32_t number) {
@@ -216,6 +235,23 @@ void Proxy::reply(PlainItem& item) {
   const bool endsRequest = checkReply(*client, item.requestId, item.isFirst);
   client->window.received(windowBytesOf(item.message));
   deliver(*client, item.requestId, std::move(item.message), endsRequest);
+}
+
+void Proxy::reply(const PlainItems& items) {
+  auto* const client = tryFind(items.client);
+  if (client == nullptr || isDraining()) return;
+  std::size_t sent = 0;
+  if (client->held.empty() && client->window.permits(items.run.size(), kWindowBytesBeside)) {
+    sent = server_.replyTo(client->local, items.run, items.isFirst);
+    const auto bytes = static_cast<std::uint32_t>(sent * kWindowBytesBeside);
+    client->window.received(bytes);
+    if (items.isFirst) ended(*client, static_cast<std::uint32_t>(sent));
+    giveCredit(*client, bytes);
+  }
+  for (; sent < items.run.size(); ++sent) {
+    auto item = items[sent];
+    reply(item);
+  }
 }
 
 void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {

@@ -59,6 +59,7 @@ class Proxy final : private Polled {
   // Hand an item of the far server to client `number`.
   void reply(std::uint32_t number, wire::Reply::Reader reply);
   void reply(PlainItem& item);
+  void reply(const PlainItems& items);
   void endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate, const std::string& why);
   void queueFull(std::uint32_t number);
   void refuse(std::uint32_t number, const std::string& why);
@@ -97,6 +98,7 @@ class Proxy final : private Polled {
   void close(std::uint32_t number);
   void loseReply(std::uint32_t number, wire::Reply::Reader reply, const std::string& why);
   void forward(Message request);
+  void forward(std::uint64_t local, const MessageRun& requests);
   Client* tryFindSender(std::uint64_t local);
   Client* tryFindOrOpen(std::uint64_t local);
   Client* tryFind(std::uint32_t number);
@@ -106,7 +108,7 @@ class Proxy final : private Polled {
   void giveCredit(Client& client, std::uint64_t bytes);
   [[nodiscard]] bool awaits(const Client& client, std::uint32_t requestId) const noexcept;
   void end(std::uint32_t number, std::uint32_t requestId, Fate fate);
-  void ended(Client& client) noexcept;
+  void ended(Client& client, std::uint32_t requests = 1) noexcept;
   void retryHeld();
 
   RouterContext& context_;
@@ -126,6 +128,7 @@ class Proxy final : private Polled {
   RelayServer server_;
   Alarm again_;
   std::unique_ptr<Readable> readable_;
+  MessageRun run_;  // of requests; used by pump()
 };
 
 }  // namespace mpf::router

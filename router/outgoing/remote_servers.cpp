@@ -272,6 +272,14 @@ void RemoteServers::handle(PlainItem& item) {
   if (proxy->isDone()) sweep();
 }
 
+void RemoteServers::handle(const PlainItems& items) {
+  if (items.isRequest) refuseClientsItem();
+  auto* proxy = connection_->openedProxyOf(items.client);
+  if (proxy == nullptr) return;
+  proxy->reply(items);
+  if (proxy->isDone()) sweep();
+}
+
 void RemoteServers::onFate(wire::RequestEnd::Reader fate) {
   auto* proxy = connection_->openedProxyOf(fate.getClient());
   if (proxy == nullptr) return;

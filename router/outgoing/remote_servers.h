@@ -43,6 +43,7 @@ class RemoteServers {
   //   throws  ProtocolError
   void handle(wire::Item::Reader item);
   void handle(PlainItem& item);
+  void handle(const PlainItems& items);
   // Takes requests of the local clients while the line has room.
   void pump();
   // A request cannot be sent, for the reason `why`.

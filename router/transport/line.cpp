@@ -160,8 +160,9 @@ bool Line::handleSome() {
       continue;
     }
     hasHandled_ = true;
-    const auto at = nextItem_++;
-    if (!tryHandlePlain(at, notices)) {
+    const auto plain = handlePlain(notices);
+    const auto at = std::exchange(nextItem_, nextItem_ + std::max(plain, 1u));
+    if (plain == 0) {
       notices.give();  // this item may take long
       handle((*items_)[at]);
       notices.give();
@@ -186,15 +187,28 @@ bool Line::tryNextFrame() {
   return true;
 }
 
-// Returns false, and has done nothing, when the item is not plain.
-bool Line::tryHandlePlain(capnp::uint index, NoticeBatch& notices) {
-  if (!plain_ || state_ != State::open || !events_.onPlain) return false;
+// Returns how many items it has handled: 0 if the next one is not plain.
+capnp::uint Line::handlePlain(NoticeBatch& notices) {
+  if (!plain_ || state_ != State::open || !events_.onPlain) return 0;
+  const auto noteClient = [&](std::uint32_t client) {
+    // The next messages may cause no notice.
+    if (std::exchange(plainItem_.client, client) != client) notices.give();
+  };
+  if (nextItem_ + 1 < items_->size() && events_.onPlainItems) {
+    const auto items = plain_->readRun(nextItem_, items_->size(), plainRun_);
+    if (const auto number = static_cast<capnp::uint>(plainRun_.size()); number > 1) {
+      noteClient(items.client);
+      count(record_->messagesReceived, number);
+      events_.onPlainItems(items);
+      return number;
+    }
+  }
   const auto client = plainItem_.client;
-  if (!plain_->tryRead(index, plainItem_)) return false;
-  if (plainItem_.client != client) notices.give();  // the next messages may cause no notice
+  if (!plain_->tryRead(nextItem_, plainItem_)) return 0;
+  if (plainItem_.client != client) notices.give();
   count(record_->messagesReceived);
   events_.onPlain(plainItem_);
-  return true;
+  return 1;
 }
 
 void Line::handle(wire::Item::Reader item) {
@@ -253,6 +267,11 @@ void Line::send(Carried carried) {
 void Line::send(const PlainOutgoing& item) {
   if (isEnding()) queue_.reject(item);
   else enqueue(item);
+}
+
+void Line::send(const PlainItems& items) {
+  for (std::size_t at = 0; isEnding() && at < items.run.size(); ++at) queue_.reject(items[at]);
+  if (!isEnding()) enqueue(items);
 }
 
 // Writes after all tasks that are ready now, so that what they send shares the frame.

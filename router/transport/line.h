@@ -59,6 +59,8 @@ class Line {
     // As onItem, for requests and replies that are plain; empty: they go to onItem, too. The
     // message of `item` may be moved away.
     std::function<void(PlainItem& item)> onPlain{};
+    // The same for several items together, at least 2.
+    std::function<void(const PlainItems& items)> onPlainItems{};
     // hasRoom() may have become true.
     std::function<void()> onRoom;
     // A frame has arrived, or frames are sent; not for each part of a long frame, because a router
@@ -87,7 +89,12 @@ class Line {
   // Queues a message, even without room. A caller that can wait checks hasRoom() first.
   void send(Carried carried);
   void send(const PlainOutgoing& item);
-  [[nodiscard]] bool hasRoom() const noexcept { return state_ == State::open && queue_.hasRoom(); }
+  void send(const PlainItems& items);
+  [[nodiscard]] bool hasRoom() const noexcept { return room() != 0; }
+  // For how many messages there is room.
+  [[nodiscard]] std::size_t room() const noexcept {
+    return state_ == State::open ? queue_.room() : 0;
+  }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
   [[nodiscard]] bool hasGreeted() const noexcept { return peer_.hasArrived(); }
   // The limits of the configuration when the line started. Only bufferBytes may be smaller: a frame
@@ -122,7 +129,7 @@ class Line {
   kj::Promise<void> whenAnswersAreSent();
   bool handleSome();
   bool tryNextFrame();
-  bool tryHandlePlain(capnp::uint index, NoticeBatch& notices);
+  capnp::uint handlePlain(NoticeBatch& notices);
   void handle(wire::Item::Reader item);
   void takeGreeting(wire::Greeting::Reader greeting);
   [[nodiscard]] std::string closedReason() const;
@@ -148,6 +155,7 @@ class Line {
   capnp::uint nextItem_ = 0;
   std::optional<PlainFrame> plain_;  // the same frame
   PlainItem plainItem_;
+  MessageRun plainRun_;
   bool hasHandled_ = false;  // an item, since the last onHandled()
   SendQueue queue_;
   // Notes that are sent while items of the peer are handled are answers.

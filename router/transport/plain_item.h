@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PlainItem: a request without a deadline, or a reply, with a message of fixed size.
+// PlainItems: several of them together.
 // PlainFrame: reads the plain items of a frame in place.
 // PlainRun: builds a frame of plain items.
 //
@@ -7,14 +8,14 @@
 //                                                                   item = | Request or Reply
 //                                                                          | Envelope | message |
 //
-// Each item has the same bytes as the one before, apart from its numbers: it is copied from a
-// template that Cap'n Proto has built, and its numbers are stored at their places. A frame may mix
-// plain items with others, and any sender may arrange it in another way; what PlainFrame does not
-// recognise is left to Cap'n Proto's own reader.
+// The items of one kind have the same bytes, apart from their numbers: an item is a copy of a form,
+// with the numbers stored at their places. A frame may mix plain items with others, and any sender
+// may arrange an item in another way; an item that does not have the pointers of a form is left to
+// Cap'n Proto's own reader.
 //
-// Threads  one thread uses an object; the templates are shared by all threads.
-// Trust    a frame may have any bytes. Each pointer is checked against the end of the frame, and an
-//          item costs a bounded number of steps, however many pointers lead to the same words.
+// Threads  one thread uses an object; the forms are shared by all threads.
+// Trust    a frame may have any bytes. Each item is checked against the end of the frame, and costs
+//          a bounded number of steps, however many pointers lead to the same words.
 #pragma once
 
 #include <array>
@@ -26,6 +27,8 @@
 #include <vector>
 
 #include <mpf/message.h>
+
+#include "shm/messages/message_run.h"
 
 namespace mpf::router {
 
@@ -52,6 +55,19 @@ struct PlainItem {
   }
 };
 
+// Items of one client: requests, first replies, or further replies without missed ones. The words
+// of a message in `run` contain its requestId, clientType, clientExtra and time stamp.
+struct PlainItems {
+  bool isRequest;
+  bool isFirst;
+  std::uint32_t client;
+  const MessageRun& run;
+
+  [[nodiscard]] PlainItem operator[](std::size_t index) const {
+    return {isRequest, isFirst, client, run[index].requestId(), run.message(index)};
+  }
+};
+
 class PlainFrame {
  public:
   // nullopt: the list of items is not where PlainRun has it.
@@ -62,8 +78,16 @@ class PlainFrame {
   // Reads the item at `index`, which must be less than the number of items that Cap'n Proto finds.
   // Returns false, and `item` may have changed, when it is not plain.
   [[nodiscard]] bool tryRead(std::uint32_t index, PlainItem& item) const noexcept;
+  // Reads the items from `index` to `end` that may be handled together with that at `index`, which
+  // is the first one. Their request numbers are not 0; those of requests and of first replies
+  // become higher, so that no number comes twice. Sets `run` to them; it may have one or none.
+  [[nodiscard]] PlainItems readRun(std::uint32_t index, std::uint32_t end,
+                                   MessageRun& run) const noexcept;
 
  private:
+  struct Found;
+  [[nodiscard]] bool tryFind(std::uint32_t index, Found& found) const noexcept;
+
   kj::ArrayPtr<const capnp::word> words_;
   std::size_t first_ = 0;  // word of item 0
   std::size_t stride_ = 0;  // words of an item in the list
@@ -74,14 +98,14 @@ class PlainRun {
  public:
   // A longer run becomes several frames.
   static constexpr std::size_t kMaxBytes = std::size_t{32} << 10;
-  static constexpr std::size_t kMaxItemWords = 16;  // of an item, without its place in the list
 
   PlainRun();
   void clear() noexcept;
   [[nodiscard]] bool isFull() const noexcept { return payloadWords_ >= kMaxWords; }
   [[nodiscard]] std::size_t size() const noexcept { return items_.size(); }
-  // Appends an item. The run must not be full.
+  // Append an item; the one at `index` of several. The run must not be full.
   void append(const PlainOutgoing& item);
+  void append(const PlainItems& items, std::size_t index);
 
   // Completes the frame: its bytes are head() followed by payload().
   void buildHead();
@@ -101,6 +125,9 @@ class PlainRun {
   [[nodiscard]] const std::vector<Sent>& items() const noexcept { return items_; }
 
  private:
+  struct Numbers;
+  void append(bool isRequest, MessageType type, const Numbers& numbers, const std::byte* body);
+
   using Words = std::vector<std::uint64_t>;
   static constexpr std::size_t kMaxWords = kMaxBytes / sizeof(capnp::word) / 2;
 

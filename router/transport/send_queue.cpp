@@ -71,14 +71,24 @@ void SendQueue::push(Carried carried) {
 }
 
 void SendQueue::push(const PlainOutgoing& item) {
+  runWithRoom().append(item);
+  ++messages_;
+  countWaiting();
+}
+
+void SendQueue::push(const PlainItems& items) {
+  for (std::size_t at = 0; at < items.run.size(); ++at) runWithRoom().append(items, at);
+  messages_ += items.run.size();
+  countWaiting();
+}
+
+PlainRun& SendQueue::runWithRoom() {
   auto* last = queue_.empty() ? nullptr : std::get_if<Run>(&queue_.back());
   if (last == nullptr || (*last)->isFull()) {
     queue_.emplace_back(takeSpareRun());
     last = std::get_if<Run>(&queue_.back());
   }
-  (*last)->append(item);
-  ++messages_;
-  countWaiting();
+  return **last;
 }
 
 SendQueue::Run SendQueue::takeSpareRun() {

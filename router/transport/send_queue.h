@@ -54,13 +54,16 @@ class SendQueue {
   void push(Note note, NoteKind kind);
   void push(Carried carried);
   void push(const PlainOutgoing& item);
+  void push(const PlainItems& items);
   // Does not send a message. If it is a request, takeUnsentRequests() returns it.
   void reject(Carried carried);
   void reject(const PlainOutgoing& item);
 
-  [[nodiscard]] bool hasRoom() const noexcept {
-    return messages_ < queueSize_ && notes_ < kMaxNotes;
+  // For how many messages there is room.
+  [[nodiscard]] std::size_t room() const noexcept {
+    return messages_ < queueSize_ && notes_ < kMaxNotes ? queueSize_ - messages_ : 0;
   }
+  [[nodiscard]] bool hasRoom() const noexcept { return room() != 0; }
   // Whether so many answers wait that no more items of the peer should be handled.
   [[nodiscard]] bool hasMaxAnswers() const noexcept { return answers_ >= kMaxNotes; }
   [[nodiscard]] bool isEmpty() const noexcept { return queue_.empty(); }
@@ -92,6 +95,7 @@ class SendQueue {
   std::size_t buildPlainFrame();
   std::size_t buildOtherFrame(const FrameLimits& limits, const OnUnsendable& onUnsendable);
   void addPieces(capnp::MallocMessageBuilder& frame);
+  [[nodiscard]] PlainRun& runWithRoom();
   [[nodiscard]] Run takeSpareRun();
   void makeScratch(std::size_t bytes);
   void countWaiting() noexcept;

@@ -72,9 +72,13 @@ void lookAtPlainItems(capnp::MessageReader& frame, capnp::List<wire::Item>::Read
   if (frame.getSegment(1) != nullptr) return;
   const auto plain = router::PlainFrame::tryOpen(frame.getSegment(0));
   if (!plain) return;
+  MessageRun together;
   for (capnp::uint at = 0; at < items.size(); ++at) {
     router::PlainItem item;
     if (plain->tryRead(at, item)) compare(item, items[at]);
+    const auto run = plain->readRun(at, items.size(), together);
+    for (std::size_t index = 0; index < together.size(); ++index)
+      compare(run[index], items[at + static_cast<capnp::uint>(index)]);
   }
 }
 

@@ -22,6 +22,7 @@ class FarClientTest : public RouterPartsTest {
 
   void SetUp() override {
     onPlain_ = [this](router::PlainItem& item) { client_->request(item); };
+    onPlainItems_ = [this](const router::PlainItems& items) { client_->request(items); };
     startGreeted();
     onItem_ = [this](wire::Item::Reader item) {
       if (item.isRequest()) client_->request(item.getRequest());
@@ -121,6 +122,55 @@ TEST_F(FarClientTest, AnotherIncarnationOfTheServerReceivesNoRequest) {
   ASSERT_THAT(nextItem(), AllOf(HasSubstr("requestId = 5"), HasSubstr("neverTaken")));
   sendItems({test::request(1, 6)});
   EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 6"), HasSubstr("neverTaken")));
+}
+
+// Requests that come together are held, sent together, and refused one by one.
+TEST_F(FarClientTest, RequestsThatComeTogetherAreHeldAndSentInOrder) {
+  connectToServer(4096, {.queueSize = 4});
+  sendItems({test::request(1, 1), test::request(1, 2), test::request(1, 3)});
+  std::vector<std::uint32_t> ids;
+  const auto receive = [&](std::size_t count) {
+    runUntil([&] {
+      while (auto request = server_->receive()) {
+        ids.push_back(request.route().requestId);
+        EXPECT_TRUE(client_->isConnected());
+        EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+      }
+      return ids.size() >= count;
+    });
+  };
+  receive(3);
+  for (const auto* id : {"requestId = 1,", "requestId = 2,", "requestId = 3,"})
+    EXPECT_THAT(nextItem(), AllOf(StartsWith("(reply"), HasSubstr(id)));
+
+  sendItems({test::request(1, 4), test::request(1, 5), test::request(1, 6), test::request(1, 7),
+             test::request(1, 8)});
+
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 8"), HasSubstr("refused")));
+  receive(7);
+  EXPECT_THAT(ids, testing::ElementsAre(1, 2, 3, 4, 5, 6, 7));
+}
+
+TEST_F(FarClientTest, RepliesThatComeTogetherDoNotExceedTheWindow) {
+  connectToServer(64 + 1);
+  std::vector<Fill> requests;
+  for (std::uint32_t id = 1; id <= 4; ++id) requests.push_back(test::request(1, id));
+  sendItems(requests);
+  int replies = 0;
+  runUntil([&] {
+    while (auto request = server_->receive()) {
+      EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+      ++replies;
+    }
+    return replies == 4;
+  });
+
+  for (const auto* id : {"requestId = 1,", "requestId = 2,"})
+    EXPECT_THAT(nextItem(), AllOf(StartsWith("(reply"), HasSubstr(id)));
+  expectNoItem();
+  sendItems({test::credit(1, 2 * 64)});
+  for (const auto* id : {"requestId = 3,", "requestId = 4,"})
+    EXPECT_THAT(nextItem(), AllOf(StartsWith("(reply"), HasSubstr(id)));
 }
 
 TEST_F(FarClientTest, RepliesBeyondTheWindowWaitForCredit) {

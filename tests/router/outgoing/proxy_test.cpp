@@ -21,6 +21,7 @@ class ProxyTest : public RouterPartsTest {
   void SetUp() override {
     context_.config.limits.windowBytes = kWindowBytes;
     onPlain_ = [this](router::PlainItem& item) { proxy_->reply(item); };
+    onPlainItems_ = [this](const router::PlainItems& items) { proxy_->reply(items); };
     startGreeted();
     connection_.emplace(*line_, record_, context_.log, "far:9900", [] {});
     proxy_.emplace(context_, *connection_, router::ServerName{1, "echo"},
@@ -66,6 +67,53 @@ TEST_F(ProxyTest, AReplyThatUsesUpTheWindowGivesItAllBack) {
       {replyOf(1, id, [](auto message) { message.initUser().initValue(kWindowBytes - 64); })}));
 
   EXPECT_THAT(nextItem(), HasSubstr("(credit = (client = 1, bytes = 1048576))"));
+}
+
+TEST_F(ProxyTest, RequestsThatWaitTogetherAreAnsweredTogether) {
+  constexpr std::int32_t kRequests = 4;
+  std::vector<std::uint32_t> ids;
+  for (std::int32_t i = 0; i < kRequests; ++i) {
+    Int32Message message({.value = i});
+    message.setClientType(i + 100);
+    ids.push_back(caller_->send(std::move(message)));
+  }
+  std::vector<Fill> replies;
+  for (std::int32_t i = 0; i < kRequests; ++i) {
+    EXPECT_THAT(nextItem(),
+                AllOf(StartsWith("(request = (client = 1, requestId = " + std::to_string(ids[i])),
+                      HasSubstr("clientType = " + std::to_string(i + 100))));
+    replies.push_back(test::reply(1, ids[i], true, i));
+  }
+
+  send(frameOf(replies));
+  runClientUntil([this] { return caller_->messages.size() == kRequests; });
+
+  for (std::int32_t i = 0; i < kRequests; ++i) EXPECT_EQ(caller_->take().tryAs<Int32>()->value, i);
+}
+
+TEST_F(ProxyTest, ASecondFirstReplyEndsTheLine) {
+  const auto first = sendRequest();
+  const auto second = sendRequest();
+  send(frameOf({test::reply(1, second, true, 2)}));
+
+  send(frameOf({test::reply(1, first, true, 1), test::reply(1, second, true, 3)}));
+
+  EXPECT_THAT(farewell(), HasSubstr("a first reply to request " + std::to_string(second)));
+  runClientUntil([this] { return caller_->messages.size() == 2; });
+  EXPECT_EQ(caller_->take().tryAs<Int32>()->value, 2);
+  EXPECT_EQ(caller_->take().tryAs<Int32>()->value, 1);
+}
+
+TEST_F(ProxyTest, RepliesThatComeTogetherMayNotExceedTheWindow) {
+  const auto id = sendRequest();
+  send(frameOf({replyOf(1, id, [](auto message) { message.initInt32(); })}));
+  std::vector<Fill> replies;
+  for (std::uint32_t count = 0; count <= kWindowBytes / 64; ++count)
+    replies.push_back(test::reply(1, id, false));
+
+  send(frameOf(replies));
+
+  EXPECT_THAT(farewell(), HasSubstr("beyond its window of 1048576 bytes"));
 }
 
 // Far more replies than the client has room for, before it receives the first one.

@@ -127,6 +127,7 @@ class LineTest : public testing::Test {
                   said_.push_back(router::toStd(kj::str(item)));
                 },
             .onPlain = onPlain_,
+            .onPlainItems = onPlainItems_,
             .onRoom =
                 [this] {
                   if (onRoom_) onRoom_();
@@ -156,7 +157,9 @@ class LineTest : public testing::Test {
   std::string end_;                // why the line ended; empty: it has not
   bool sent_ = false;              // the bytes of beginToSend() have been read
   std::function<void(wire::Item::Reader)> onItem_;
-  std::function<void(router::PlainItem&)> onPlain_;  // set it before start()
+  // Set them before start().
+  std::function<void(router::PlainItem&)> onPlain_;
+  std::function<void(const router::PlainItems&)> onPlainItems_;
   std::function<void()> onRoom_;
   std::function<void()> onHandled_;  // set it before start()
 

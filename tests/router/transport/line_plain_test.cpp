@@ -83,6 +83,25 @@ TEST_F(LinePlainTest, KeepsTheOrderOfPlainItemsAndOthers) {
   EXPECT_EQ(row_.messagesReceived, 3u);
 }
 
+TEST_F(LinePlainTest, ReportsItemsTogetherInTheirOrder) {
+  onPlainItems_ = [this](const router::PlainItems& items) {
+    std::string text = "together";
+    for (std::size_t at = 0; at < items.run.size(); ++at)
+      text += ' ' + std::to_string(items[at].requestId);
+    said_.push_back(text);
+  };
+  startGreeted();
+
+  send(joined({plainFrame(1, 18), plainFrame(19, 1),
+               frameOf({request(20, 0), request(21, 0), request(22, 99), request(23, 0)})}));
+
+  EXPECT_THAT(said_,
+              ElementsAre("together 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16", "together 17 18",
+                          "plain 19", "together 20 21", HasSubstr("requestId = 22"), "plain 23"));
+  EXPECT_EQ(row_.messagesReceived, 23u);
+  hangUp();
+}
+
 TEST_F(LinePlainTest, FramesMayArriveInAnyTwoParts) {
   const auto bytes = joined({plainFrame(1, 2), plainFrame(3, 1), plainFrame(4, 2)});
   for (std::size_t cut = 1; cut < bytes.size(); cut += 5) {

@@ -93,6 +93,20 @@ std::vector<std::string> readPlain(const Words& segment, std::size_t items) {
   return texts;
 }
 
+// Expects that items that are read together are read as each of them.
+void compareRuns(const PlainFrame& frame, std::uint32_t items) {
+  MessageRun run;
+  for (std::uint32_t at = 0; at < items; ++at) {
+    const auto read = frame.readRun(at, items, run);
+    ASSERT_LE(at + run.size(), items);
+    for (std::size_t index = 0; index < run.size(); ++index) {
+      PlainItem item;
+      ASSERT_TRUE(frame.tryRead(at + static_cast<std::uint32_t>(index), item));
+      ASSERT_EQ(describe(read[index]), describe(item));
+    }
+  }
+}
+
 // Returns how many items only Cap'n Proto has read.
 int compareReaders(const Words& segment) {
   const kj::ArrayPtr<const capnp::word> only = arrayOf(segment);
@@ -102,6 +116,7 @@ int compareReaders(const Words& segment) {
   try {
     const auto items = reader.getRoot<wire::Frame>().getItems();
     const auto plain = readPlain(segment, items.size());
+    if (const auto frame = PlainFrame::tryOpen(arrayOf(segment))) compareRuns(*frame, items.size());
     for (capnp::uint at = 0; at < items.size(); ++at) {
       const auto expected = describe(items[at]);
       if (plain[at].empty() && !expected.empty()) ++differing;
@@ -192,6 +207,77 @@ TEST(PlainItem, CarriesOnlyMessagesOfFixedSize) {
   EXPECT_FALSE(PlainItem::canCarry(Message::copyInline(MessageType::int32, {}))) << "unsound";
   EXPECT_FALSE(PlainItem::canCarry(
       Int32ArrayMessage::inBuffer(allocateHeapBody(Int32ArrayMessage::bytesFor(1)), 1)));
+}
+
+PlainItem int32Item(std::uint32_t id) {
+  return {.isRequest = true, .client = 1, .requestId = id, .message = Int32Message({.value = 1})};
+}
+// How many of the items are read together.
+std::size_t runLength(std::vector<PlainItem> items) {
+  const auto segment = runOf(items);
+  const auto frame = PlainFrame::tryOpen(arrayOf(segment));
+  MessageRun run;
+  const auto read = frame->readRun(0, static_cast<std::uint32_t>(items.size()), run);
+  for (std::size_t at = 0; at < run.size(); ++at)
+    EXPECT_EQ(describe(read[at]), describe(items[at])) << at;
+  return run.size();
+}
+// The same for two items, the second one changed.
+template <class Change>
+std::size_t runLengthWith(const Change& change, PlainItem (*make)(std::uint32_t)) {
+  std::vector<PlainItem> items;
+  items.push_back(make(1));
+  items.push_back(make(2));
+  change(items.back());
+  return runLength(std::move(items));
+}
+
+TEST(PlainItems, AreOfOneKindClientAndType) {
+  EXPECT_EQ(runLengthWith([](PlainItem&) {}, int32Item), 2u);
+  EXPECT_EQ(runLengthWith([](PlainItem& item) { item.client = 2; }, int32Item), 1u);
+  EXPECT_EQ(runLengthWith([](PlainItem& item) { item.isRequest = false; }, int32Item), 1u);
+  EXPECT_EQ(runLengthWith([](PlainItem& item) { item.message = OutOfBandMessage(); }, int32Item),
+            1u);
+  const auto float64 = [](std::uint32_t id) {
+    auto item = int32Item(id);
+    item.message = Float64Message();
+    return item;
+  };
+  EXPECT_EQ(runLengthWith([](PlainItem&) {}, float64), 0u) << "they do not fit into a slot";
+}
+
+TEST(PlainItems, HaveRisingNumbersIfEachEndsOrBeginsARequest) {
+  const auto setId = [](std::uint32_t id) {
+    return [id](PlainItem& item) { item.requestId = id; };
+  };
+  const auto first = [](std::uint32_t id) {
+    auto item = int32Item(id);
+    item.isRequest = false;
+    item.isFirst = true;
+    return item;
+  };
+  const auto further = [](std::uint32_t id) {
+    auto item = int32Item(id);
+    item.isRequest = false;
+    return item;
+  };
+  EXPECT_EQ(runLengthWith(setId(1), int32Item), 1u);
+  EXPECT_EQ(runLengthWith(setId(1), first), 1u);
+  EXPECT_EQ(runLengthWith(setId(1), further), 2u);
+  EXPECT_EQ(runLengthWith(setId(UINT32_MAX), first), 1u) << "less than 1, as a difference";
+  EXPECT_EQ(runLengthWith(setId(0), further), 1u);
+  EXPECT_EQ(runLengthWith([](PlainItem& item) { item.isFirst = false; }, first), 1u);
+  EXPECT_EQ(
+      runLengthWith(
+          [](PlainItem& item) { item.message.setRoute({0, 0, Message::missedFlags(1), nullptr}); },
+          further),
+      1u);
+}
+
+TEST(PlainItems, AreAtMost16) {
+  std::vector<PlainItem> items;
+  for (std::uint32_t id = 1; id <= 17; ++id) items.push_back(int32Item(id));
+  EXPECT_EQ(runLength(std::move(items)), 16u);
 }
 
 // A frame that Cap'n Proto has built, with items of all kinds.

@@ -97,6 +97,26 @@ TEST_F(SendQueueTest, KeepsTheOrderOfPlainItemsAndOthers) {
   EXPECT_EQ(row_.inQueue, 0u);
 }
 
+TEST_F(SendQueueTest, SendsItemsThatCameTogether) {
+  MessageRun run(MessageType::int32);
+  for (const std::uint32_t id : {2, 3}) {
+    run.add(EnvelopeWords::of({.requestId = id, .clientType = 7, .clientExtra = 8, .timeNs = 9}, 1,
+                              layout::kFirstSlotBodyBytes));
+    run.add(FirstBody{id, 0, 0});
+  }
+  queue_.push(plain(1, false));
+  queue_.push(router::PlainItems{false, true, 1, run});
+  EXPECT_EQ(row_.inQueue, 3u);
+  EXPECT_EQ(queue_.room(), kQueueSize - 3);
+
+  EXPECT_THAT(frames(), ElementsAre(HasSubstr("requestId = 1, "),
+                                    AllOf(HasSubstr("requestId = 2, isFirst = true"),
+                                          HasSubstr("clientType = 7, clientExtra = 8, "),
+                                          HasSubstr("timeStampNs = 9")),
+                                    HasSubstr("requestId = 3, ")));
+  EXPECT_EQ(row_.messagesSent, 3u);
+}
+
 TEST_F(SendQueueTest, ARepliesMissedMessagesAreSentWithIt) {
   auto reply = plain(1, false);
   reply.message.setRoute({0, 0, Message::missedFlags(7), nullptr});
