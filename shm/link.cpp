@@ -330,13 +330,13 @@ void Link::endFanOut() noexcept {
   else pool_.loans().retireAll();
 }
 
-void Link::afterFencedPush() noexcept {
+void Link::afterFencedPush(std::uint64_t messages) noexcept {
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
   if (!peer_ || outWatch_.load(std::memory_order_relaxed) != layout::Watch::unwatched) return;
   // The receiver must wake up before the ring is full.
   const auto room = side_ == LinkSide::client ? header().queueSize : geometry_.replySlots;
-  NoticeBatch::notify(peer_, peerIndex_, room / 2);
+  NoticeBatch::notify(peer_, peerIndex_, messages, room / 2);
 }
 
 // Of each kMaxInterval messages to a peer that polls, the first one for which this is called is

@@ -172,7 +172,7 @@ class Link {
     const auto count =
         out_.pushRun([&](std::size_t index) { return words(index, index == 0 ? firstNs : 0); },
                      bodies.data(), most, limits.reserve, sent);
-    if (count != 0) afterPush();
+    if (count != 0) afterPush(count);
     return count;
   }
   // While it exists, messages are sent without a notice to the peer; at its end, one notice stands
@@ -184,7 +184,7 @@ class Link {
     }
     ~Batch() {
       link_.isInBatch_ = false;
-      if (link_.out_.messages() != sentBefore_) link_.afterPush();
+      if (const auto sent = link_.out_.messages() - sentBefore_; sent != 0) link_.afterPush(sent);
     }
     Batch(const Batch&) = delete;
     Batch& operator=(const Batch&) = delete;
@@ -291,14 +291,14 @@ class Link {
   // Sends a body that is in a chunk; false if the ring is full.
   bool trySendRef(const Envelope& envelope, std::size_t bodyBytes, const layout::ChunkRef& ref,
                   std::uint32_t reserve) noexcept;
-  [[gnu::always_inline]] void afterPush() noexcept {
+  [[gnu::always_inline]] void afterPush(std::uint64_t messages = 1) noexcept {
     if (isInBatch_) return;
     MPF_STEP(peer_checked);
     expedited_barrier::frequentSide();
     if (outWatch_.load(std::memory_order_relaxed) != layout::Watch::polledUnfenced)
-      afterFencedPush();
+      afterFencedPush(messages);
   }
-  void afterFencedPush() noexcept;
+  void afterFencedPush(std::uint64_t messages) noexcept;
   std::int64_t timeIfDue(bool isPolled) noexcept;
   [[gnu::always_inline]] std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref) {
     if (ref.side == peerSide()) {

@@ -33,29 +33,30 @@ class NoticeBatch {
     delayed_ = 0;
     if (const auto peer = std::exchange(peer_, nullptr)) peer->notify(link_);
   }
-  // Notifies the owner of `peer` of link `link`. If this thread has a batch, that delays the notice
-  // until the run has `most` messages.
+  // Notifies the owner of `peer` of messages on link `link`. If this thread has a batch, that delays
+  // the notice until `most` messages have no notice.
   static void notify(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link,
-                     std::uint32_t most) noexcept {
+                     std::uint64_t messages, std::uint32_t most) noexcept {
     if (current_ == nullptr) peer->notify(link);
-    else current_->delay(peer, link, most);
+    else current_->delay(peer, link, messages, most);
   }
 
  private:
-  void delay(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link,
+  void delay(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link, std::uint64_t messages,
              std::uint32_t most) noexcept {
     if (peer_ != peer || link_ != link) {
       give();
       peer_ = peer;
       link_ = link;
     }
-    if (++delayed_ >= most) give();
+    delayed_ += messages;
+    if (delayed_ >= most) give();
   }
 
   static inline constinit thread_local NoticeBatch* current_ = nullptr;
   std::shared_ptr<PeerWindow> peer_;  // nullptr: no notice is delayed
   std::uint32_t link_ = 0;
-  std::uint32_t delayed_ = 0;  // messages since the last notice
+  std::uint64_t delayed_ = 0;  // messages since the last notice
 };
 
 }  // namespace mpf

@@ -19,6 +19,7 @@ struct Traffic {
   int sends = 1;           // sends in a row, before all their replies are received
   int messages = 1;        // messages in all sends of an exchange together
   std::size_t window = 0;  // not 0: instead of exchanges, this number of messages is outstanding
+  bool inRuns = false;     // MpfPlaces::inRuns
 };
 
 // `writer` is the pid of the process that has the client's socket.
@@ -79,7 +80,10 @@ Measurement remoteRow(const Place& place, const std::string& question, const std
   auto row = rowAt(place, question, "MPF remote, " + name, true);
   row.bytes = bytes;
   row.run = [=, mode = place.wait, routers = place.routers](const Stage& stage) {
-    const MpfPlaces places{routers->serverBackplane(), routers->clientBackplane(), kRemoteLocation};
+    const MpfPlaces places{.serverBackplane = routers->serverBackplane(),
+                           .clientBackplane = routers->clientBackplane(),
+                           .location = kRemoteLocation,
+                           .inRuns = traffic.inRuns};
     const std::shared_ptr<Peer> peer = makeMpfPeer<Array>({mode, bytes, false, {}}, places);
     return routers->run([&] { return goThereAndBack(stage, peer, traffic, routers->clientPid()); });
   };
@@ -99,6 +103,7 @@ std::vector<Measurement> messageRows(const Place& place, bool withLocal) {
   const std::string gathered = "100 in one write";
   const std::string gathered1000 = "1000 in one write";
   const Traffic one{1, 1}, hundred{100, 100}, thousand{1000, 1000};
+  const Traffic hundredInRuns{100, 100, 0, true}, thousandInRuns{1000, 1000, 0, true};
   std::vector<Measurement> rows;
   rows.push_back(tcpRow(place, kMessages, none, one, kInt32));
   rows.push_back(tcpRow(place, kMessages, gathered, {1, 100}, 100 * kInt32));
@@ -113,6 +118,11 @@ std::vector<Measurement> messageRows(const Place& place, bool withLocal) {
   rows.push_back(besides(remoteRow(place, kMessages, "100 buffered", hundred, kInt32), gathered));
   rows.push_back(
       besides(remoteRow(place, kMessages, "1000 buffered", thousand, kInt32), gathered1000));
+  rows.push_back(besides(
+      remoteRow(place, kMessages, "100 buffered, in batches", hundredInRuns, kInt32), gathered));
+  rows.push_back(
+      besides(remoteRow(place, kMessages, "1000 buffered, in batches", thousandInRuns, kInt32),
+              gathered1000));
   return rows;
 }
 

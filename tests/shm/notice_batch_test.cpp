@@ -59,6 +59,19 @@ TEST_F(NoticeBatchTest, NotifiesWhenHalfOfTheQueueIsFull) {
   EXPECT_FALSE(one_->wasNotified()) << "it begins a new run";
 }
 
+TEST_F(NoticeBatchTest, CountsTheMessagesOfARun) {
+  const NoticeBatch batch;
+  {
+    const Link::Batch run(one_->link.client);
+    for (int i = 1; i < 32; ++i) one_->sendOne();
+  }
+  EXPECT_FALSE(one_->wasNotified());
+
+  one_->sendOne();
+
+  EXPECT_TRUE(one_->wasNotified());
+}
+
 TEST_F(NoticeBatchTest, GivesADelayedNoticeOnce) {
   NoticeBatch batch;
   one_->sendOne();

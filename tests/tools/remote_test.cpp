@@ -97,7 +97,7 @@ TEST_F(RemoteTest, ReportsShowServersOnOtherHosts) {
                           ContainsRegex("  → " + routers_.address() + " +connected +1 ")));
   EXPECT_THAT(
       routers,
-      AllOf(ContainsRegex("RMRClient stateConnected queueSize 100 inQueue 0 sendQueueFull 0\n"
+      AllOf(ContainsRegex("RMRClient stateConnected queueSize 256 inQueue 0 sendQueueFull 0\n"
                           "   Server echo@1 has 1 client. bindState connected\n"
                           "   sendPerSec [0-9]+ receivePerSec [0-9]+  tcpSendPerSec [0-9]+ "
                           "tcpReceivePerSec [0-9]+\n"),
@@ -105,7 +105,7 @@ TEST_F(RemoteTest, ReportsShowServersOnOtherHosts) {
   EXPECT_THAT(server, AllOf(HasSubstr("queueRequests 1\n"),
                             HasSubstr(routers_.address() + ", connected, round trip ")));
   EXPECT_THAT(there,
-              ContainsRegex("RMRServer stateConnected queueSize 100 inQueue 0 replyQueueFull 0\n"
+              ContainsRegex("RMRServer stateConnected queueSize 256 inQueue 0 replyQueueFull 0\n"
                             "   Server echo@1 has 1 client. bindState connected\n"));
   const auto seen = line(routers_.near());
   EXPECT_GE(seen.at("messages_sent"), 1);
@@ -127,7 +127,7 @@ TEST_F(RemoteTest, ReportsShowALostConnectionAndItsReturn) {
   EXPECT_THAT(gone.at("problem").get<std::string>(), testing::Not(IsEmpty()));
   EXPECT_EQ(gone.at("round_trip_ns"), 0) << "the connection has ended";
   EXPECT_EQ(gone.at("in_queue"), 0);
-  EXPECT_EQ(gone.at("queue_size"), 100);
+  EXPECT_EQ(gone.at("queue_size"), 256);
   EXPECT_THAT(near({"mrr", "--interval", "1"}).out, HasSubstr("   problem "));
   EXPECT_EQ(ls(routers_.far()).at("routers").at(0).at("state"), "dead");
   EXPECT_THAT(far({"clean"}).out, HasSubstr(".r."));
