@@ -154,6 +154,11 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   template <class Run, class Accept>
   void takeRun(Run& run, std::size_t most, const Accept& accept) noexcept;
   bool tryEndRequest(const EnvelopeWords& reply) noexcept;
+  // Whether a request has had neither a reply nor a fate.
+  [[nodiscard]] bool isAwaited(std::uint32_t requestId) noexcept {
+    const auto* const request = sender_.requests()->find(requestId);
+    return request != nullptr && !request->isGivenUp;
+  }
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   void deliverFate(const UntakenRequest& request, Fate fate);
@@ -178,6 +183,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   bool isPaused_ = false;
   ValueHandler values_;  // written before bind()
   RunReceiver* runs_ = nullptr;  // likewise; nullptr: all replies are delivered one by one
+  int takenBehind_ = 0;  // messages of the last run behind its first one
   End end_;  // in the states ending and interrupted, and at the end in the state left
 };
 

@@ -45,7 +45,10 @@ EnvelopeWords wordsOf(const Message& first, std::uint8_t flags) noexcept {
 bool Binding::takeSome(int most) {
   int taken = 0;
   for (; taken < most && isLinked() && !isPaused_ && channel().hasMessage(); ++taken) {
-    if (tryTakeOne()) continue;
+    if (tryTakeOne()) {
+      if (takenBehind_ != 0) taken += std::exchange(takenBehind_, 0);
+      continue;
+    }
     count(control().protocolErrors);
     disconnect("the server sent invalid data", Ending::protocolError);
   }
@@ -75,6 +78,9 @@ void Binding::deliverRemaining(const MessageLink* ended) {
       dropReply(envelope.body(), request);
       return true;
     }
+  } else if (runs_ != nullptr && isAwaited(envelope.requestId)) {
+    // The far router would take it for an error of this one.
+    return false;
   }
   if (!MessageLink::isShort(envelope.body())) {
     return tryTakeLong(envelope.body(), envelope.marks(), {envelope.sentTick, envelope.timeNs},
@@ -221,15 +227,14 @@ bool Binding::tryDeliverRun(const Message& first) {
   run.add(FirstBody::of(first.body().data()));
   takeRun(run, most, [&](const EnvelopeWords& words) {
     if (!run.accepts(words)) return false;
-    if (areFirst) {
-      if (!tryEndRequest(words)) return false;
-    } else if (words.sentTick() != 0) {
-      noteTimes(words.sentTick(), nullptr);
-    }
+    if (areFirst ? !tryEndRequest(words) : isAwaited(words.requestId())) return false;
+    if (!areFirst && words.sentTick() != 0) noteTimes(words.sentTick(), nullptr);
     run.add(words);
     return true;
   });
   if (run.size() == 1) return false;
+  takenBehind_ = static_cast<int>(run.size() - 1);
+  parts_.endpoint.countTurns(static_cast<std::uint32_t>(takenBehind_));
   runs_->onRun(run, areFirst);
   return true;
 }

@@ -167,6 +167,12 @@ int Dispatcher::Impl::descriptor() {
 }
 
 bool Dispatcher::Impl::runPending(int most) {
+  const bool isDone = runSome(most);
+  if (!isDone && hasDescriptor_) endpoint().keepReadable();
+  return isDone;
+}
+
+bool Dispatcher::Impl::runSome(int most) {
   const auto guard = becomeRunner();
   parts_.timer.setWaitingThread();
   // Peers may send messages and hints without end: the event loop must have its turn.
@@ -175,7 +181,6 @@ bool Dispatcher::Impl::runPending(int most) {
     dropKnocks();
     if (!hasDescriptor_ || endpoint().arm()) return true;
   }
-  if (hasDescriptor_) endpoint().keepReadable();
   return false;
 }
 

@@ -38,6 +38,8 @@ class Dispatcher::Impl {
   }
   bool runOnce(Deadline deadline);
   bool runPending(int most);
+  // As RelayDispatcher::runSome().
+  bool runSome(int most);
   int descriptor();
   // Runs until `isDone` or the deadline, or until another thread wants to run the dispatcher.
   // Returns false, and runs nothing, when callbacks belong on another thread.

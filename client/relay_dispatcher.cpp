@@ -7,4 +7,6 @@ namespace mpf {
 
 void RelayDispatcher::setPolled(bool isPolled) noexcept { impl_->endpoint().setPolled(isPolled); }
 
+bool RelayDispatcher::runSome(int batches) { return impl_->runSome(batches); }
+
 }  // namespace mpf

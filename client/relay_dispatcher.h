@@ -16,6 +16,8 @@ class RelayDispatcher : public Dispatcher {
   // does not become readable for messages. After a change to false, call runPending() until it
   // returns true.
   void setPolled(bool isPolled) noexcept;
+  // As runPending(), but after false the descriptor need not be readable: the caller calls again.
+  bool runSome(int batches);
 };
 
 }  // namespace mpf

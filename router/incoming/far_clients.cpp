@@ -10,6 +10,9 @@
 namespace mpf::router {
 namespace {
 
+// Batches of messages that the dispatcher runs between two looks at the line and the clock. After a
+// single message, the second one finds that there are no more.
+constexpr int kBatches = 2;
 // The time for the dispatcher before the event loop runs its other tasks.
 constexpr std::chrono::milliseconds kDispatcherTurn{1};
 
@@ -104,7 +107,8 @@ void FarClients::run() {
   if (!dispatcher_ || !line_.hasRoom()) return;
   const auto end = Deadline::after(kDispatcherTurn);
   bool isDrained = false;
-  while (!isDrained && !end.hasPassed() && line_.hasRoom()) isDrained = dispatcher_->runPending(1);
+  while (!isDrained && !end.hasPassed() && line_.hasRoom())
+    isDrained = dispatcher_->runSome(kBatches);
   dropped_.clear();
   if (!isDrained && line_.hasRoom()) return timer_.setAt(Deadline::after(Nanoseconds(0)));
   scheduleRun();

@@ -18,10 +18,6 @@ class ReplyWindow {
   [[nodiscard]] std::uint32_t bytes() const noexcept { return bytes_; }
   // Whether the peer must not send another reply now. The last reply may exceed the window.
   [[nodiscard]] bool isUsedUp() const noexcept { return unpaid_ >= bytes_; }
-  // Whether it may send this number of replies, at least one, of `bytes` bytes each.
-  [[nodiscard]] bool permits(std::size_t replies, std::uint32_t bytes) const noexcept {
-    return unpaid_ + (replies - 1) * bytes < bytes_;
-  }
   void received(std::uint32_t bytes) noexcept { unpaid_ += bytes; }
   // The client has received a reply, or it was dropped. Returns the credit to be sent now; 0: none.
   [[nodiscard]] std::uint32_t taken(std::uint64_t bytes) noexcept;

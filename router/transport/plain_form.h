@@ -13,11 +13,13 @@
 
 #include <mpf/message_types.h>
 
+#include "shm/messages/message_run.h"
+
 namespace mpf::router {
 
 // Calls `act` with the type of a plain message of this number. Returns false for other types.
 template <class Act>
-bool withPlainType(MessageType type, Act&& act) {
+constexpr bool withPlainType(MessageType type, Act&& act) {
   switch (type) {
     case MessageType::int32:
       return act(std::type_identity<Int32>());
@@ -31,6 +33,14 @@ bool withPlainType(MessageType type, Act&& act) {
       return false;
   }
 }
+
+// What is in runs is plain: PlainRun has a form for it.
+template <class... T>
+constexpr bool areRunsPlain(std::type_identity<std::tuple<T...>> /*types*/) {
+  return ((!MessageRun::canHave(T::kType) || withPlainType(T::kType, [](auto) { return true; })) &&
+          ...);
+}
+static_assert(areRunsPlain(std::type_identity<MessageTypes>()));
 
 inline constexpr std::size_t kWordBytes = sizeof(capnp::word);
 

@@ -175,6 +175,7 @@ PlainItems PlainFrame::readRun(std::uint32_t index, std::uint32_t end,
                                MessageRun& run) const noexcept {
   PlainItems items{false, false, 0, run};
   run.begin(MessageType::none);
+  std::uint32_t first = 0;
   std::uint32_t last = 0;
   for (Found found; index != end && !run.isFull(); ++index) {
     if (!tryFind(index, found) || !MessageRun::canHave(found.type) || found.missed() != 0) break;
@@ -186,9 +187,10 @@ PlainItems PlainFrame::readRun(std::uint32_t index, std::uint32_t end,
       items.isRequest = found.isRequest;
       items.isFirst = found.isFirst();
       items.client = client;
+      first = last = id;
     } else if (found.type != run.type() || found.isRequest != items.isRequest ||
                found.isFirst() != items.isFirst || client != items.client ||
-               (static_cast<std::int32_t>(id - last) <= 0 && (items.isRequest || items.isFirst))) {
+               (id - first <= last - first && (items.isRequest || items.isFirst))) {
       break;
     }
     if (id == 0) break;

@@ -79,8 +79,9 @@ class PlainFrame {
   // Returns false, and `item` may have changed, when it is not plain.
   [[nodiscard]] bool tryRead(std::uint32_t index, PlainItem& item) const noexcept;
   // Reads the items from `index` to `end` that may be handled together with that at `index`, which
-  // is the first one. Their request numbers are not 0; those of requests and of first replies
-  // become higher, so that no number comes twice. Sets `run` to them; it may have one or none.
+  // is the first one. Their request numbers are not 0; those of requests and of first replies move
+  // away from the first one, beyond the highest number to the lowest, so that none comes twice.
+  // Sets `run` to them; it may have one or none.
   [[nodiscard]] PlainItems readRun(std::uint32_t index, std::uint32_t end,
                                    MessageRun& run) const noexcept;
 

@@ -67,7 +67,15 @@ TEST_F(RelayTest, ARunEndsAtARequestThatCannotBeSent) {
     static_cast<void>(server_->reply(std::move(request)));
     EXPECT_EQ(next().route().requestId, id);
   }
-  EXPECT_EQ(client_.sendAs(int32Run({9, 10})), 2u) << "their places are free";
+  EXPECT_EQ(client_.sendAs(int32Run({9, 10, 11, 12})), 4u) << "their places are free";
+  // More often than requests may be outstanding.
+  for (int refusals = 0; refusals < 100; ++refusals)
+    ASSERT_EQ(client_.sendAs(int32Run({13, 14})), 0u) << "the queue is full";
+  for (const std::uint32_t id : {9, 10, 11, 12}) {
+    static_cast<void>(server_->reply(take()));
+    EXPECT_EQ(next().route().requestId, id);
+  }
+  EXPECT_EQ(client_.sendAs(int32Run({13, 14})), 2u);
 }
 
 // A client that gets replies together.
@@ -146,6 +154,49 @@ TEST_F(RelayRunReceiverTest, GetsNoReplyToARequestThatHasHadItsFate) {
   EXPECT_EQ(messages_[0].getType(), MessageType::requestFate);
   EXPECT_EQ(messages_[1].tryAs<Int32>()->value, 3);
   EXPECT_EQ(messages_[2].tryAs<Int32>()->value, 1);
+  messages_.clear();
+}
+
+// Other clients of the dispatcher have their turn after about as many messages as without runs.
+TEST_F(RelayRunReceiverTest, GetsOneLongRunInATurn) {
+  const auto request = std::move(sendRequests(1).front());
+  const auto further = request.duplicate();
+  std::vector<Message> replies;
+  for (int count = 0; count < 20; ++count) replies.push_back(further.duplicate());
+  for (auto& message : replies) reply(std::move(message));
+
+  std::size_t most = 0;
+  for (bool isDone = false; !isDone;) {
+    runs_.clear();
+    isDone = dispatcher_.runPending(1);
+    std::size_t values = 0;
+    for (const auto& run : runs_) values += static_cast<std::size_t>(std::ranges::count(run, '1'));
+    most = std::max(most, values);
+  }
+
+  EXPECT_GE(most, 2u);
+  EXPECT_LE(most, 17u);
+  messages_.clear();
+}
+
+// A far router would close the connection, which other clients use, too.
+TEST_F(RelayRunReceiverTest, GetsNoFurtherReplyBeforeTheFirstOne) {
+  auto request = std::move(sendRequests(1).front());
+  const auto client = server_->clientOf(request);
+  const auto further = request.duplicate();
+  reply(std::move(request));
+  std::uint32_t id = 0;
+  ASSERT_EQ(client_.send(Int32Message(), Deadline::never(), &id), SendResult::sent);
+  for (int count = 0; count < 2; ++count) reply(further.duplicate());
+  ASSERT_EQ(server_->replyTo(client, id, Int32Message()), ReplyResult::sent);
+
+  runUntil([&] { return news_.size() == 2; });
+
+  EXPECT_EQ(client_.notConnectedBecause(), "the server sent invalid data");
+  EXPECT_THAT(runs_, testing::ElementsAre("further 1 1"));
+  ASSERT_THAT(messages_, testing::SizeIs(2));
+  EXPECT_EQ(messages_[0].tryAs<Int32>()->value, 1);
+  EXPECT_EQ(fateOf(messages_[1]), Fate::outcomeUnknown);
   messages_.clear();
 }
 

@@ -63,9 +63,18 @@ void compare(const router::PlainItem& plain, wire::Item::Reader item) {
   const auto message = tryFromWire(envelope, {kMaxMessageBytes}, error);
   const bool isSame = message && message->getType() == plain.message.getType() &&
                       std::ranges::equal(message->body(), plain.message.body()) &&
-                      plain.requestId == (plain.isRequest ? item.getRequest().getRequestId()
-                                                          : item.getReply().getRequestId());
-  if (!isSame) std::abort();
+                      message->getClientType() == plain.message.getClientType() &&
+                      message->getClientExtra() == plain.message.getClientExtra() &&
+                      message->getTimeStampNs() == plain.message.getTimeStampNs();
+  const auto hasNumbersOf = [&](auto carrier) {
+    return plain.client == carrier.getClient() && plain.requestId == carrier.getRequestId();
+  };
+  const bool isOfIt = plain.isRequest
+                          ? hasNumbersOf(item.getRequest())
+                          : hasNumbersOf(item.getReply()) &&
+                                plain.isFirst == item.getReply().getIsFirst() &&
+                                plain.message.getMissed() == item.getReply().getMissed();
+  if (!isSame || !isOfIt) std::abort();
 }
 
 void lookAtPlainItems(capnp::MessageReader& frame, capnp::List<wire::Item>::Reader items) {

@@ -21,7 +21,10 @@ class ProxyTest : public RouterPartsTest {
   void SetUp() override {
     context_.config.limits.windowBytes = kWindowBytes;
     onPlain_ = [this](router::PlainItem& item) { proxy_->reply(item); };
-    onPlainItems_ = [this](const router::PlainItems& items) { proxy_->reply(items); };
+    onPlainItems_ = [this](const router::PlainItems& items) {
+      ++together_;
+      proxy_->reply(items);
+    };
     startGreeted();
     connection_.emplace(*line_, record_, context_.log, "far:9900", [] {});
     proxy_.emplace(context_, *connection_, router::ServerName{1, "echo"},
@@ -58,6 +61,7 @@ class ProxyTest : public RouterPartsTest {
   std::optional<RemoteConnection> connection_;
   std::optional<Proxy> proxy_;
   std::optional<Caller> caller_;
+  int together_ = 0;  // times that replies came together
 };
 
 TEST_F(ProxyTest, AReplyThatUsesUpTheWindowGivesItAllBack) {
@@ -89,6 +93,20 @@ TEST_F(ProxyTest, RequestsThatWaitTogetherAreAnsweredTogether) {
   runClientUntil([this] { return caller_->messages.size() == kRequests; });
 
   for (std::int32_t i = 0; i < kRequests; ++i) EXPECT_EQ(caller_->take().tryAs<Int32>()->value, i);
+  EXPECT_EQ(together_, 1);
+}
+
+TEST_F(ProxyTest, RequestsOfARefusedClientThatWaitTogetherAreRefused) {
+  constexpr std::size_t kRequests = 3;
+  proxy_->refuse(1, "it is full");
+  for (std::size_t count = 0; count < kRequests; ++count) caller_->send(Int32Message());
+
+  runClientUntil([this] { return caller_->messages.size() == kRequests; });
+
+  for (std::size_t count = 0; count < kRequests; ++count)
+    EXPECT_EQ(fateOf(caller_->take()), Fate::refused);
+  send(frameOf({ping(1)}));
+  EXPECT_THAT(nextItem(), StartsWith("(pong")) << "the peer has received none of them";
 }
 
 TEST_F(ProxyTest, ASecondFirstReplyEndsTheLine) {
@@ -122,8 +140,11 @@ TEST_F(ProxyTest, RepliesAreHeldInOrderUntilTheClientHasRoom) {
   const auto id = sendRequest();
   std::vector<Fill> replies;
   for (std::int32_t i = 0; i < kReplies; ++i) replies.push_back(test::reply(1, id, i == 0, i));
+  const auto last = replies.end() - 3;
 
-  send(frameOf(replies));
+  send(frameOf({replies.begin(), last}));
+  dispatcher_.runPending();  // now there is room
+  send(frameOf({last, replies.end()}));
   runClientUntil([this] { return caller_->messages.size() == kReplies; });
 
   for (std::int32_t i = 0; i < kReplies; ++i) {
