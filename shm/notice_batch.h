@@ -33,8 +33,8 @@ class NoticeBatch {
     delayed_ = 0;
     if (const auto peer = std::exchange(peer_, nullptr)) peer->notify(link_);
   }
-  // Notifies the owner of `peer` of messages on link `link`. A batch of this thread delays the notice
-  // until there are `most` messages without one.
+  // Notifies the owner of `peer` of messages on link `link`. If this thread has a batch, it delays
+  // the notice until there are `most` messages without one.
   static void notify(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link,
                      std::uint64_t messages, std::uint32_t most) noexcept {
     if (current_ == nullptr) peer->notify(link);
