@@ -54,14 +54,14 @@ class Sniffer {
  private:
   static constexpr Nanoseconds kConnectLimit = std::chrono::seconds(2);
   static constexpr Nanoseconds kQuiet = std::chrono::milliseconds(200);
-  static constexpr Nanoseconds kStopLimit = std::chrono::seconds(1);
+  static constexpr Nanoseconds kStopLimit = std::chrono::seconds(10);
 
   [[nodiscard]] bool isOver(Deadline deadline) const {
-    return stopped_ || wasRefused_ || deadline.hasPassed();
+    return signals_ != 0 || wasRefused_ || deadline.hasPassed();
   }
 
   void stop() noexcept {
-    stopped_.store(true);
+    ++signals_;
     dispatcher_.interrupt();
   }
 
@@ -97,12 +97,16 @@ class Sniffer {
   }
 
   // Stops sniffing and receives the bytes of the last few milliseconds, which the server still has.
+  // A further signal ends the wait for a server that does not answer.
   void drain() {
     if (!isListening_ ||
         client_.send(Int32Message({.cmd = serial::cmdSniffStop})) != SendResult::sent)
       return;
     const auto limit = Deadline::after(kStopLimit);
-    while (isListening_ && !limit.hasPassed()) dispatcher_.runOnce(limit);
+    const int signals = signals_;
+    while (isListening_ && signals_ == signals && !limit.hasPassed()) dispatcher_.runOnce(limit);
+    if (isListening_)
+      printError("{}: \"{}\" did not answer: its last bytes may be missing\n", program_, service_);
   }
 
   void takeMissing(std::uint64_t bytes) {
@@ -127,7 +131,7 @@ class Sniffer {
   std::uint64_t missing_ = 0;
   bool isListening_ = false;
   bool wasRefused_ = false;
-  std::atomic<bool> stopped_{false};
+  std::atomic<int> signals_{0};  // to stop
   Dispatcher dispatcher_;
   MessageClient client_;
   StopSignals stop_;

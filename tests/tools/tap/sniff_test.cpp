@@ -136,6 +136,32 @@ TEST_F(SniffToolTest, PrintsTheLastBytesAtItsEnd) {
   }
 }
 
+// A server that is stopped in a debugger.
+TEST_F(SniffToolTest, ASecondSignalEndsTheWaitForAServerThatDoesNotAnswer) {
+  MessageServer server(backplane_, "serial[0].sniff");
+  const auto next = [&] {
+    for (;;) {
+      server.waitForMessage();
+      if (auto request = server.receive()) return request;
+    }
+  };
+  Tool tool({"sniff", "serial[0]"}, backplane_.name());
+  auto start = next();
+  start.tryAs<Int32>()->status = sniffStatusOK;
+  ASSERT_EQ(server.reply(std::move(start)), ReplyResult::sent);
+  while (tool.err().find("listening to") == std::string::npos) std::this_thread::yield();
+
+  tool.signal(SIGINT);
+  const auto stop = next();
+  EXPECT_EQ(stop.tryAs<Int32>()->cmd, cmdSniffStop);
+  tool.signal(SIGINT);
+
+  const auto ended = tool.end();
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.err,
+              HasSubstr("\"serial[0].sniff\" did not answer: its last bytes may be missing\n"));
+}
+
 TEST_F(SniffToolTest, ListensAgainAfterARestartOfTheServer) {
   listen();
   const auto tool = sniff();
