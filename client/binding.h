@@ -73,8 +73,9 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
 
   // --- dispatcher's thread ---
   void tryConnect();
-  // Handles up to `most` messages or runs of values of the link, or one change of its state.
-  // Returns false when there was neither.
+  // Handles up to `most` messages or runs of values of the link, or one change of its state. The
+  // messages of a run for a RunReceiver count one by one; the last run may exceed `most`. Returns
+  // false when there was nothing to handle.
   bool takeSome(int most);
   enum class Ending {
     // The server is dead or has closed the link: it will not receive the remaining requests.
@@ -154,7 +155,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   template <class Run, class Accept>
   void takeRun(Run& run, std::size_t most, const Accept& accept) noexcept;
   bool tryEndRequest(const EnvelopeWords& reply) noexcept;
-  // Whether a request has had neither a reply nor a fate.
+  // Whether a request is pending: it has had neither a reply nor a fate.
   [[nodiscard]] bool isAwaited(std::uint32_t requestId) noexcept {
     const auto* const request = sender_.requests()->find(requestId);
     return request != nullptr && !request->isGivenUp;
@@ -183,7 +184,8 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   bool isPaused_ = false;
   ValueHandler values_;  // written before bind()
   RunReceiver* runs_ = nullptr;  // likewise; nullptr: all replies are delivered one by one
-  int takenBehind_ = 0;  // messages of the last run behind its first one
+  // Messages of a run, without its first one, that takeSome() has still to count.
+  int takenBehind_ = 0;
   End end_;  // in the states ending and interrupted, and at the end in the state left
 };
 

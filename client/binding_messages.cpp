@@ -79,7 +79,7 @@ void Binding::deliverRemaining(const MessageLink* ended) {
       return true;
     }
   } else if (runs_ != nullptr && isAwaited(envelope.requestId)) {
-    // The far router would take it for an error of this one.
+    // The other router would treat this reply as a protocol error of this router.
     return false;
   }
   if (!MessageLink::isShort(envelope.body())) {
@@ -213,33 +213,33 @@ void Binding::takeFirstReplies(const Message& first, ValueRun& run) noexcept {
   });
 }
 
-// Delivers `first` together with the replies behind it: all are first replies to their requests, or
-// none is. Returns false, and has delivered nothing, if `first` is alone.
+// Delivers `first` together with the replies behind it: each is the first reply to its request, or
+// each is a further one. Returns false, and has delivered nothing, if `first` is alone.
 bool Binding::tryDeliverRun(const Message& first) {
-  if (!MessageRun::canHave(first.getType()) || first.body().size() != layout::kFirstSlotBodyBytes ||
+  if (!MessageRun::canHold(first.getType()) || first.body().size() != layout::kFirstSlotBodyBytes ||
       first.getMissed() != 0)
     return false;
   const auto most = std::min(runs_->room(), MessageRun::kMost);
   if (most < 2) return false;
-  const bool areFirst = (first.route().flags & kEndsRequest) != 0;
-  MessageRun run(first.getType(), areFirst ? layout::kSlotFirstReply : std::uint8_t{0});
+  const bool isFirst = (first.route().flags & kEndsRequest) != 0;
+  MessageRun run(first.getType(), isFirst ? layout::kSlotFirstReply : std::uint8_t{0});
   run.add(wordsOf(first, 0));
   run.add(FirstBody::of(first.body().data()));
   takeRun(run, most, [&](const EnvelopeWords& words) {
     if (!run.accepts(words)) return false;
-    if (areFirst ? !tryEndRequest(words) : isAwaited(words.requestId())) return false;
-    if (!areFirst && words.sentTick() != 0) noteTimes(words.sentTick(), nullptr);
+    if (isFirst ? !tryEndRequest(words) : isAwaited(words.requestId())) return false;
+    if (!isFirst && words.sentTick() != 0) noteTimes(words.sentTick(), nullptr);
     run.add(words);
     return true;
   });
   if (run.size() == 1) return false;
   takenBehind_ = static_cast<int>(run.size() - 1);
   parts_.endpoint.countTurns(static_cast<std::uint32_t>(takenBehind_));
-  runs_->onRun(run, areFirst);
+  runs_->onRun(run, isFirst);
   return true;
 }
 
-// Takes messages behind the first one of `run`, as long as there are fewer than `most`.
+// Takes up to `most` - 1 messages after the first one of `run`, while `accept` is true.
 template <class Run, class Accept>
 void Binding::takeRun(Run& run, std::size_t most, const Accept& accept) noexcept {
   const auto taken = channel().link().incoming().takeRun(
@@ -247,7 +247,7 @@ void Binding::takeRun(Run& run, std::size_t most, const Accept& accept) noexcept
   count(control().received, taken);
 }
 
-// Ends the request of a first reply that is taken in a run. Returns false if it has had a fate.
+// Ends the request of a first reply that is taken in a run. Returns false if it is not pending.
 bool Binding::tryEndRequest(const EnvelopeWords& reply) noexcept {
   auto* const request = sender_.requests()->find(reply.requestId());
   if (request == nullptr || request->isGivenUp) return false;

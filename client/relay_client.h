@@ -21,8 +21,10 @@ class RelayClient : public MessageClient {
   // The same for a run of requests without deadlines. Returns how many were sent; the others may be
   // sent one by one, which says why they are refused.
   [[nodiscard]] std::size_t sendAs(const MessageRun& run) noexcept;
-  // `receiver`, which outlives this object, gets consecutive replies together. Replies that come
-  // alone and all other messages go to the callback of the constructor. Call it before bind().
+  // `receiver`, which outlives this object, gets consecutive Int32 or OutOfBand replies together.
+  // Replies that come alone and all other messages go to the callback of the constructor. From now
+  // on, a further reply before the first one ends the link as a protocol error. Call it before
+  // bind(), once.
   void setRunReceiver(RunReceiver& receiver);
   // Whether a message that the callback received ended its request.
   [[nodiscard]] static bool endsRequest(const Message& message) noexcept {

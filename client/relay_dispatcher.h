@@ -16,7 +16,9 @@ class RelayDispatcher : public Dispatcher {
   // does not become readable for messages. After a change to false, call runPending() until it
   // returns true.
   void setPolled(bool isPolled) noexcept;
-  // As runPending(), but after false the descriptor need not be readable: the caller calls again.
+  // As runPending(), but after false the descriptor need not be readable: the caller calls again
+  // without waiting for it.
+  //   throws  as runPending(); then the descriptor is readable
   bool runSome(int batches);
 };
 

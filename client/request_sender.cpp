@@ -32,6 +32,13 @@ std::int64_t nsOf(Deadline takeBefore) noexcept {
   return takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1);
 }
 
+// What is done after each message of a run.
+auto noteSent(Link& link) noexcept {
+  return [&clientSent = link.control().clientSent](std::uint64_t messages) {
+    clientSent.store(messages, std::memory_order_relaxed);
+  };
+}
+
 std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
   return std::make_unique<Message>(message.duplicate());
 } catch (const std::bad_alloc&) {
@@ -132,9 +139,9 @@ SendResult RequestSender::sendAs(std::uint32_t requestId, Message& message,
 }
 
 std::size_t RequestSender::sendAs(const MessageRun& run) noexcept {
+  // One attempt: the rest is sent one by one.
   const auto sendAll = [&](std::size_t) {
-    const auto count = sendLocked(run);
-    return SentMany{count, count == run.size() ? SendResult::sent : SendResult::queueFull};
+    return SentMany{sendRunLocked(run), SendResult::queueFull};
   };
   return sendInBatch(run.size(), 0, sendAll).count;
 }
@@ -257,18 +264,15 @@ std::size_t RequestSender::sendRunLocked(const Bodies& bodies, std::int64_t dead
                               .timeNs = deadlineNs},
                              1, layout::kFirstSlotBodyBytes);
   };
-  const auto noteSent = [&clientSent = link.control().clientSent](std::uint64_t messages) {
-    clientSent.store(messages, std::memory_order_relaxed);
-  };
   const auto count =
-      link.trySendRun(words, bodies.first(most).all, {link.header().queueSize, 0}, noteSent);
+      link.trySendRun(words, bodies.first(most).all, {link.header().queueSize, 0}, noteSent(link));
   if (count != 0) isFullReported_ = false;
   return count;
 }
 
 // Sends the first requests of `run`, as many as there is room for, under their own numbers. All are
-// added to the table before, because the ring asks for an envelope only when it has room for it.
-std::size_t RequestSender::sendLocked(const MessageRun& run) noexcept {
+// added to the table before: `words` cannot refuse, but the place of a number may be in use.
+std::size_t RequestSender::sendRunLocked(const MessageRun& run) noexcept {
   auto& link = channel_->link();
   if (link.maxMessageBytes() < layout::kFirstSlotBodyBytes) return 0;
   std::array<Request*, MessageRun::kMost> added;
@@ -293,12 +297,9 @@ std::size_t RequestSender::sendLocked(const MessageRun& run) noexcept {
     const auto& given = run[sent + index];
     return EnvelopeWords{body, given.request, given.clientWith(Tick::ofSample(sentNs)), 0};
   };
-  const auto noteSent = [&clientSent = link.control().clientSent](std::uint64_t messages) {
-    clientSent.store(messages, std::memory_order_relaxed);
-  };
   while (sent < count) {
     const auto rest = run.values(sent, count - sent);
-    const auto next = link.trySendRun(words, rest, {link.header().queueSize, 0}, noteSent);
+    const auto next = link.trySendRun(words, rest, {link.header().queueSize, 0}, noteSent(link));
     if (next == 0) break;
     sent += next;
   }

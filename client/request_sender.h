@@ -98,7 +98,7 @@ class RequestSender {
   template <class SendNext>
   SentMany sendInBatch(std::size_t count, std::int64_t deadlineNs,
                        const SendNext& sendNext) noexcept;
-  std::size_t sendLocked(const MessageRun& run) noexcept;
+  std::size_t sendRunLocked(const MessageRun& run) noexcept;
   SentMany sendNextLocked(const Bodies& bodies, std::int64_t deadlineNs,
                           std::span<std::uint32_t> requestIds) noexcept;
   std::size_t sendRunLocked(const Bodies& bodies, std::int64_t deadlineNs,

@@ -12,11 +12,14 @@ namespace mpf {
 
 class RunReceiver {
  public:
-  // How many replies the next run may have; if fewer than 2, the next reply comes alone.
+  // How many replies the next run may have, at most MessageRun::kMost of which are taken; if fewer
+  // than 2, the next reply comes alone. Called before each run.
   [[nodiscard]] virtual std::size_t room() const noexcept = 0;
-  // Consecutive replies of a type that MessageRun can have, at least 2.
-  //   areFirst  they are first replies to one request each, which they end, or all are further ones
-  virtual void onRun(const MessageRun& run, bool areFirst) = 0;
+  // Consecutive replies of a type that MessageRun can hold, at least 2, with their time stamps.
+  // They are valid until it returns. It may throw, as the callback of the client.
+  //   isFirst  true: each is the first reply to its request, which it has ended; false: each is a
+  //            further reply, perhaps to different requests
+  virtual void onRun(const MessageRun& run, bool isFirst) = 0;
 
  protected:
   ~RunReceiver() = default;

@@ -32,17 +32,21 @@ class RelayServer : public MessageServer {
   // not become readable for requests. After a change to false, call receive() until it returns an
   // empty handle.
   void setPolled(bool isPolled) noexcept;
-  // As receive(). If the next requests of a client have no deadline, are of the same type, and this
-  // type may be in a run, takes up to `most` of them into `run`, sets `client`, which was 0, and
-  // returns an empty handle. The caller ends these requests, as if it had kept the results of
-  // clientOf() and requestId; `run` is empty if the client has sent invalid data.
+  // As receive(). If at least two requests of a client wait, and the next ones are of one type that
+  // MessageRun can hold and have no deadline, takes up to `most` of them (2 to MessageRun::kMost)
+  // into `run`, perhaps one, and returns an empty handle. The caller ends them, as if it had kept
+  // the results of clientOf() and requestId.
+  //   client  out: the client of the run; 0: no run was taken, and `run` has any contents
+  //   run     out: empty if the client has sent invalid data
   //   throws  as receive()
   [[nodiscard]] Message receive(MessageRun& run, std::uint64_t& client, std::size_t most);
-  // Ends requests of a run that was received as `refused`.
+  // Ends the requests of `run`, which receive() has filled, with the fate `refused`.
   void refuse(std::uint64_t client, const MessageRun& run) noexcept;
-  // As replyTo(), with several replies: all are first replies to one request each, or none is.
-  // Stops at one of which this is not true, or for which there is no room. Returns how many were
-  // sent.
+  // As replyTo(), with several replies that missed none. Stops at the first one for which `isFirst`
+  // is wrong, or there is no room. Returns how many were sent; 0 if the client is gone. A time of 0
+  // in the words of a reply stands for now, if the server stamps its replies.
+  //   isFirst  true: each is the first reply to its request, whose numbers differ; false: each is a
+  //            further reply
   [[nodiscard]] std::size_t replyTo(std::uint64_t client, const MessageRun& run,
                                     bool isFirst) noexcept;
   // Whether that request still has no reply.

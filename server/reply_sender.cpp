@@ -142,14 +142,9 @@ void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& req
 
 void ReplySender::sendRun(Connection& connection, std::uint32_t generation,
                           const MessageRun& run) noexcept {
-  if (connection.isInherited()) return;
-  std::size_t sent = 0;
-  {
-    const BiasedLock::Guard lock(*connection.lock);
-    // The handler may have received further requests, and closed the connection.
-    if (connection.generation != generation || !connection.channel) return;
-    sent = sendRunLocked(connection, run, run.size(), true);
-  }
+  // The handler may have received further requests, and closed the connection.
+  const Route route{reinterpret_cast<std::uint64_t>(&connection), 0, generation, nullptr};
+  const auto sent = sendRun(route, run, true);
   if (sent < run.size()) refuse(connection, generation, run, sent);
 }
 

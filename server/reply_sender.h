@@ -34,7 +34,7 @@ class ReplySender {
   void sendRun(Connection& connection, std::uint32_t generation, const MessageRun& run) noexcept;
   // As RelayServer::replyTo(), with a run.
   std::size_t sendRun(const Route& route, const MessageRun& run, bool isFirst) noexcept;
-  // Ends those from `index` on with the fate `refused`.
+  // Ends the requests of `run` from `index` on with the fate `refused`.
   void refuse(Connection& connection, std::uint32_t generation, const MessageRun& run,
               std::size_t index) noexcept;
   // Ends a request of `connection` with a fate.

@@ -184,11 +184,12 @@ Message ServerCore::receiveOrHandleRun(bool& hasHandledRun) {
 }
 
 Message ServerCore::receiveOrTakeRun(MessageRun& run, std::uint64_t& client, std::size_t most) {
+  client = 0;
   return receiveUnless([&](Connection& connection) {
     auto& ring = connection.channel->link().incoming();
     const auto type = static_cast<MessageType>(ring.nextType());
-    if (most < 2 || !MessageRun::canHave(type) || !ring.hasSecond()) return false;
-    const auto number = connection.client();
+    if (most < 2 || !MessageRun::canHold(type) || !ring.hasSecond()) return false;
+    const auto number = connection.client();  // tryTakeRun() may close the connection
     run.begin(type);
     if (!tryTakeRun(connection, run, most)) return false;
     client = number;
@@ -255,7 +256,8 @@ bool ServerCore::tryHandleRun(Connection& connection, MessageType type, const Ha
 }
 
 // Takes up to `most` requests without a deadline of the type of `run`. Returns false if there is
-// none. If the id of a request is invalid, closes the connection and leaves the run empty.
+// none. If the id of a request is invalid, closes the connection, leaves the run empty, and returns
+// true.
 bool ServerCore::tryTakeRun(Connection& connection, MessageRun& run, std::size_t most) noexcept {
   auto& link = connection.channel->link();
   if (link.maxMessageBytes() < layout::kFirstSlotBodyBytes) return false;

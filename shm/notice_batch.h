@@ -34,7 +34,8 @@ class NoticeBatch {
     if (const auto peer = std::exchange(peer_, nullptr)) peer->notify(link_);
   }
   // Notifies the owner of `peer` of messages on link `link`. If this thread has a batch, it delays
-  // the notice until there are `most` messages without one.
+  // the notice until at least `most` messages have been sent since the last one.
+  //   messages  sent since the last call for this link
   static void notify(const std::shared_ptr<PeerWindow>& peer, std::uint32_t link,
                      std::uint64_t messages, std::uint32_t most) noexcept {
     if (current_ == nullptr) peer->notify(link);

@@ -158,9 +158,9 @@ std::size_t FarClient::room() const noexcept {
   return std::min(inWindow, shared_.line.room());
 }
 
-void FarClient::onRun(const MessageRun& run, bool areFirst) {
+void FarClient::onRun(const MessageRun& run, bool isFirst) {
   useWindow(static_cast<std::int64_t>(run.size() * kWindowBytesBeside));
-  shared_.line.send(PlainItems{false, areFirst, terms_.number, run});
+  shared_.line.send(PlainItems{false, isFirst, terms_.number, run});
 }
 
 //   missed  further replies that the server has dropped before this one

@@ -91,7 +91,7 @@ class FarClient final : private RunReceiver {
   };
   void onMessage(Message&& message);
   [[nodiscard]] std::size_t room() const noexcept override;
-  void onRun(const MessageRun& run, bool areFirst) override;
+  void onRun(const MessageRun& run, bool isFirst) override;
   void useWindow(std::int64_t bytes);
   void drop(std::uint32_t requestId, bool isFirst, std::uint32_t missed);
   [[nodiscard]] std::uint32_t takeDropped(std::uint32_t requestId);

@@ -103,9 +103,10 @@ bool Proxy::pump(int most) {
   if (isDraining()) return false;
   state_ = State::ready;
   bool hasTaken = false;
-  while (most > 0 && connection_.line().hasRoom()) {
+  while (most != 0 && connection_.line().hasRoom()) {
     std::uint64_t local = 0;
-    auto request = server_.receive(run_, local, connection_.line().room());
+    auto request = server_.receive(
+        run_, local, std::min(static_cast<std::size_t>(most), connection_.line().room()));
     if (!request && local == 0) {
       state_ = State::idle;
       break;
@@ -166,9 +167,9 @@ void Proxy::forward(Message request) {
 void Proxy::forward(std::uint64_t local, const MessageRun& requests) {
   auto* const client = tryFindSender(local);
   if (client == nullptr) return server_.refuse(local, requests);
-  const auto number = static_cast<std::uint32_t>(requests.size());
-  client->unanswered += number;
-  unanswered_ += number;
+  const auto count = static_cast<std::uint32_t>(requests.size());
+  client->unanswered += count;
+  unanswered_ += count;
   if (!client->refusal)
     return connection_.line().send(PlainItems{true, false, client->number, requests});
   for (std::size_t at = 0; at < requests.size(); ++at)
@@ -241,7 +242,7 @@ void Proxy::reply(const PlainItems& items) {
   auto* const client = tryFind(items.client);
   if (client == nullptr || isDraining()) return;
   std::size_t sent = 0;
-  // If no reply is held, less than a quarter of the window is used, so a run does not exceed it.
+  // If no reply is held, less than a quarter of the window is used, and a run fits into the rest.
   if (client->held.empty()) {
     sent = server_.replyTo(client->local, items.run, items.isFirst);
     const auto bytes = static_cast<std::uint32_t>(sent * kWindowBytesBeside);

@@ -264,15 +264,11 @@ void RemoteServers::handle(wire::Item::Reader item) {
   }
 }
 
-void RemoteServers::handle(PlainItem& item) {
-  if (item.isRequest) refuseClientsItem();
-  auto* proxy = connection_->openedProxyOf(item.client);
-  if (proxy == nullptr) return;
-  proxy->reply(item);
-  if (proxy->isDone()) sweep();
-}
+void RemoteServers::handle(PlainItem& item) { handlePlain(item); }
+void RemoteServers::handle(const PlainItems& items) { handlePlain(items); }
 
-void RemoteServers::handle(const PlainItems& items) {
+template <class Items>
+void RemoteServers::handlePlain(Items& items) {
   if (items.isRequest) refuseClientsItem();
   auto* proxy = connection_->openedProxyOf(items.client);
   if (proxy == nullptr) return;

@@ -63,6 +63,8 @@ class RemoteServers {
   void bind(const ServerName& name, Wanted& wanted);
   void unbind(const Wanted& wanted);
   void onServer(wire::Server::Reader server);
+  template <class Items>
+  void handlePlain(Items& items);
   void onFate(wire::RequestEnd::Reader fate);
   void onRefusal(const ServerName& name, Wanted& wanted, const std::string& why);
   void makeProxy(const ServerName& name, Wanted& wanted);

@@ -146,22 +146,26 @@ kj::Promise<void> Line::whenAnswersAreSent() {
 
 // Returns false when items are left for the next turn.
 bool Line::handleSome() {
-  constexpr unsigned kItemsPerCheck = 16;  // between two looks at the clock
+  constexpr capnp::uint kItemsPerCheck = 16;  // between two looks at the clock
   const auto endNs = Clock::nowNs() + kTurnNs;
   if (items_) keepAlive_.received(Clock::nowNs());  // the peer is not late: its items were waiting
   noteKind_ = SendQueue::NoteKind::answer;
   KJ_DEFER(noteKind_ = SendQueue::NoteKind::own);
   NoticeBatch notices;
-  for (unsigned handled = 1; !queue_.hasMaxAnswers(); ++handled) {
-    if (handled % kItemsPerCheck == 0 && Clock::nowNs() >= endNs) return false;
+  capnp::uint handled = 0;  // items and frames, since the last look
+  while (!queue_.hasMaxAnswers()) {
+    if (handled >= kItemsPerCheck && Clock::nowNs() >= endNs) return false;
+    if (handled >= kItemsPerCheck) handled = 0;
     if (!items_ && !tryNextFrame()) return true;
     if (!items_ || nextItem_ == items_->size()) {
       items_.reset();
+      ++handled;
       continue;
     }
     hasHandled_ = true;
     const auto plain = handlePlain(notices);
     const auto at = std::exchange(nextItem_, nextItem_ + std::max(plain, 1u));
+    handled += std::max(plain, 1u);
     if (plain == 0) {
       notices.give();  // this item may take long
       handle((*items_)[at]);
@@ -192,20 +196,19 @@ capnp::uint Line::handlePlain(NoticeBatch& notices) {
   if (!plain_ || state_ != State::open || !events_.onPlain) return 0;
   const auto noteClient = [&](std::uint32_t client) {
     // The next messages may cause no notice.
-    if (std::exchange(plainItem_.client, client) != client) notices.give();
+    if (std::exchange(plainClient_, client) != client) notices.give();
   };
   if (nextItem_ + 1 < items_->size() && events_.onPlainItems) {
-    const auto items = plain_->readRun(nextItem_, items_->size(), plainRun_);
-    if (const auto number = static_cast<capnp::uint>(plainRun_.size()); number > 1) {
+    const auto items = plain_->readItems(nextItem_, items_->size(), plainMessages_);
+    if (const auto handled = static_cast<capnp::uint>(plainMessages_.size()); handled > 1) {
       noteClient(items.client);
-      count(record_->messagesReceived, number);
+      count(record_->messagesReceived, handled);
       events_.onPlainItems(items);
-      return number;
+      return handled;
     }
   }
-  const auto client = plainItem_.client;
   if (!plain_->tryRead(nextItem_, plainItem_)) return 0;
-  if (plainItem_.client != client) notices.give();
+  noteClient(plainItem_.client);
   count(record_->messagesReceived);
   events_.onPlain(plainItem_);
   return 1;

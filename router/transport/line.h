@@ -2,7 +2,7 @@
 // Line: one connection to another router. It reads the peer's frames and hands on their items,
 // writes the frames of its SendQueue, and ends the connection with a farewell.
 //
-//   stream ─► FrameReader ─► items ─► Events::onItem, plain items ─► Events::onPlain
+//   stream ─► FrameReader ─► items ─► Events::onItem, plain items ─► Events::onPlain, onPlainItems
 //   send() ─► SendQueue ─► frames of all that waits, up to Limits::bufferBytes ─► stream
 //
 // States:
@@ -59,7 +59,8 @@ class Line {
     // As onItem, for requests and replies that are plain; empty: they go to onItem, too. The
     // message of `item` may be moved away.
     std::function<void(PlainItem& item)> onPlain{};
-    // The same for several items together, at least 2.
+    // The same for several items together, at least 2, which are valid until it returns; empty:
+    // each goes to onPlain.
     std::function<void(const PlainItems& items)> onPlainItems{};
     // hasRoom() may have become true.
     std::function<void()> onRoom;
@@ -155,7 +156,8 @@ class Line {
   capnp::uint nextItem_ = 0;
   std::optional<PlainFrame> plain_;  // the same frame
   PlainItem plainItem_;
-  MessageRun plainRun_;
+  MessageRun plainMessages_;
+  std::uint32_t plainClient_ = 0;  // of the last plain item
   bool hasHandled_ = false;  // an item, since the last onHandled()
   SendQueue queue_;
   // Notes that are sent while items of the peer are handled are answers.

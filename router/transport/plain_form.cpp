@@ -20,11 +20,11 @@ class StructPlaces {
   [[nodiscard]] std::size_t words() const { return dataWords + pointers; }
 
   // `size`: bytes of the field
-  [[nodiscard]] std::size_t of(const char* field, std::size_t size) const {
+  [[nodiscard]] std::size_t byteOf(const char* field, std::size_t size) const {
     return schema_.getFieldByName(field).getProto().getSlot().getOffset() * size;
   }
-  [[nodiscard]] std::size_t bitOf(const char* field) const { return of(field, 1); }
-  [[nodiscard]] std::size_t pointerOf(const char* field) const { return of(field, 1); }
+  [[nodiscard]] std::size_t bitOf(const char* field) const { return byteOf(field, 1); }
+  [[nodiscard]] std::size_t pointerOf(const char* field) const { return byteOf(field, 1); }
   [[nodiscard]] std::size_t which() const {
     return schema_.getProto().getStruct().getDiscriminantOffset() * sizeof(std::uint16_t);
   }
@@ -62,11 +62,11 @@ PlainForm formOf(const StructPlaces& carrier, const StructPlaces& envelope) {
   const auto data = envelopeAt * kWordBytes;
   storeLittle(kj::arrayPtr(form.words.data(), form.words.size()).asBytes(), data + type.whichAt,
               type.which);
-  form.client = carrier.of("client", 4);
-  form.requestId = carrier.of("requestId", 4);
-  form.clientType = data + envelope.of("clientType", 4);
-  form.clientExtra = data + envelope.of("clientExtra", 4);
-  form.timeStamp = data + envelope.of("timeStampNs", 8);
+  form.client = carrier.byteOf("client", 4);
+  form.requestId = carrier.byteOf("requestId", 4);
+  form.clientType = data + envelope.byteOf("clientType", 4);
+  form.clientExtra = data + envelope.byteOf("clientExtra", 4);
+  form.timeStamp = data + envelope.byteOf("timeStampNs", 8);
   for (std::size_t field = 0; field < WirePlaces<T>::kFields; ++field)
     form.fields[field] = messageAt * kWordBytes + type.fields[field];
   return form;
@@ -77,8 +77,8 @@ PlainForms::Kind kindOf(std::uint16_t number, const StructPlaces& carrier) {
   PlainForms::Kind kind;
   kind.number = number;
   kind.shape = structPointer(0, carrier.dataWords, carrier.pointers) >> 32;
-  kind.which = carrier.words() * kWordBytes + envelope.which();
-  kind.least = carrier.words() + envelope.words();
+  kind.typeByte = carrier.words() * kWordBytes + envelope.which();
+  kind.wordsWithoutMessage = carrier.words() + envelope.words();
   for (std::size_t type = 0; type < kind.forms.size(); ++type) {
     withPlainType(static_cast<MessageType>(type), [&]<class T>(std::type_identity<T>) {
       kind.forms[type] = formOf<T>(carrier, envelope);
@@ -103,17 +103,17 @@ PlainForms::PlainForms() {
   const auto replies = StructPlaces::of<wire::Reply>();
   request = kindOf(item.numberOf("request"), requests);
   reply = kindOf(item.numberOf("reply"), replies);
-  for (auto& form : request.forms) form.takeWithin = requests.of("takeWithinNs", 8);
+  for (auto& form : request.forms) form.takeWithin = requests.byteOf("takeWithinNs", 8);
   for (auto& form : reply.forms) {
-    form.isFirst = replies.bitOf("isFirst");
-    form.missed = replies.of("missed", 4);
+    form.isFirstBit = replies.bitOf("isFirst");
+    form.missed = replies.byteOf("missed", 4);
   }
   root = structPointer(0, frame.dataWords, frame.pointers);
   frameWords = frame.words();
   list = 1 + frame.dataWords + frame.pointerOf("items");
   itemData = item.dataWords;
   itemPointers = item.pointers;
-  itemWhich = item.which();
+  kindByte = item.which();
   itemPointer = item.dataWords + item.pointerOf("request");
 }
 

@@ -2,6 +2,8 @@
 // PlainForms: how PlainRun arranges the items of a frame; found in the schema, once.
 //
 // Threads  any number of callers at a time.
+// Throws   the first get() throws kj::Exception if the schema does not fit: a defect that each test
+//          of a router finds.
 #pragma once
 
 #include <array>
@@ -34,10 +36,10 @@ constexpr bool withPlainType(MessageType type, Act&& act) {
   }
 }
 
-// What is in runs is plain: PlainRun has a form for it.
+// Every type that MessageRun can hold is plain.
 template <class... T>
 constexpr bool areRunsPlain(std::type_identity<std::tuple<T...>> /*types*/) {
-  return ((!MessageRun::canHave(T::kType) || withPlainType(T::kType, [](auto) { return true; })) &&
+  return ((!MessageRun::canHold(T::kType) || withPlainType(T::kType, [](auto) { return true; })) &&
           ...);
 }
 static_assert(areRunsPlain(std::type_identity<MessageTypes>()));
@@ -59,12 +61,12 @@ struct PlainForm {
   static constexpr std::size_t kMostFields = 6;
 
   std::array<std::uint64_t, kMostWords> words{};  // of an item whose numbers are 0
-  std::size_t count = 0;                          // of the words; 0: the type is not plain
-  std::size_t toEnvelope = 0, toMessage = 0;      // words that are pointers
+  std::size_t count = 0;  // of the words; 0: the type is not plain
+  std::size_t toEnvelope = 0, toMessage = 0;  // words that are pointers
   // Bytes of the numbers, from the beginning of the item.
   std::size_t client = 0, requestId = 0, clientType = 0, clientExtra = 0, timeStamp = 0;
-  std::size_t takeWithin = 0;           // of a request
-  std::size_t isFirst = 0, missed = 0;  // of a reply; isFirst: its bit
+  std::size_t takeWithin = 0;  // of a request
+  std::size_t isFirstBit = 0, missed = 0;  // of a reply
   std::array<std::size_t, kMostFields> fields{};  // of the message
 };
 
@@ -77,9 +79,9 @@ struct PlainForms {
   // Requests, or replies.
   struct Kind {
     std::uint16_t number = 0;  // of the item
-    std::uint64_t shape = 0;   // upper half of the pointer to the Request or Reply
-    std::size_t which = 0;     // byte of the type in an item
-    std::size_t least = 0;     // words of an item without its message
+    std::uint64_t shape = 0;  // upper half of the pointer to the Request or Reply
+    std::size_t typeByte = 0;  // of the number of its type in an item
+    std::size_t wordsWithoutMessage = 0;
     std::array<PlainForm, std::tuple_size_v<MessageTypes> + 1> forms{};  // by MessageType
   };
   Kind request, reply;
@@ -91,8 +93,8 @@ struct PlainForms {
   std::size_t frameWords = 0;
   std::size_t list = 0;  // word of the pointer to the list of items
   std::size_t itemData = 0, itemPointers = 0;  // words of an item in the list
-  std::size_t itemWhich = 0;                   // byte of its kind
-  std::size_t itemPointer = 0;                 // the pointer to its Request or Reply
+  std::size_t kindByte = 0;  // in the list
+  std::size_t itemPointer = 0;  // the pointer to its Request or Reply
 
  private:
   PlainForms();

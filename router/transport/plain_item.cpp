@@ -114,7 +114,7 @@ struct PlainFrame::Found {
     return numberAt<Value>(bytes + at);
   }
   [[nodiscard]] bool isFirst() const noexcept {
-    return !isRequest && (bytes[form->isFirst / 8] >> (form->isFirst % 8) & 1) != 0;
+    return !isRequest && (bytes[form->isFirstBit / 8] >> (form->isFirstBit % 8) & 1) != 0;
   }
   [[nodiscard]] std::uint32_t missed() const noexcept {
     return isRequest ? 0 : number<std::uint32_t>(form->missed);
@@ -125,7 +125,7 @@ struct PlainFrame::Found {
                                                        Found& found) const noexcept {
   const auto& forms = PlainForms::get();
   const auto at = first_ + index * stride_;
-  const auto which = loadLittle<std::uint16_t>(words_.asBytes(), at * kWordBytes + forms.itemWhich);
+  const auto which = loadLittle<std::uint16_t>(words_.asBytes(), at * kWordBytes + forms.kindByte);
   found.isRequest = which == forms.request.number;
   const auto& kind = forms.kind(found.isRequest);
   if (which != kind.number) return false;
@@ -134,10 +134,10 @@ struct PlainFrame::Found {
   const auto target = static_cast<std::int64_t>(at + itemPointer_) + 1 + offset;
   if ((pointer & 3) != 0 || pointer >> 32 != kind.shape || target < 0) return false;
   const auto first = static_cast<std::size_t>(target);
-  if (first + kind.least > words_.size()) return false;
+  if (first + kind.wordsWithoutMessage > words_.size()) return false;
   found.bytes = words_.asBytes().begin() + first * kWordBytes;
   // The members of the union are in the order of MessageType, from 1 on.
-  const auto type = found.number<std::uint16_t>(kind.which) + std::size_t{1};
+  const auto type = found.number<std::uint16_t>(kind.typeByte) + std::size_t{1};
   if (type >= kind.forms.size()) return false;
   found.form = &kind.forms[type];
   found.type = static_cast<MessageType>(type);
@@ -171,14 +171,14 @@ bool PlainFrame::tryRead(std::uint32_t index, PlainItem& item) const noexcept {
   });
 }
 
-PlainItems PlainFrame::readRun(std::uint32_t index, std::uint32_t end,
-                               MessageRun& run) const noexcept {
+PlainItems PlainFrame::readItems(std::uint32_t index, std::uint32_t end,
+                                 MessageRun& run) const noexcept {
   PlainItems items{false, false, 0, run};
   run.begin(MessageType::none);
   std::uint32_t first = 0;
   std::uint32_t last = 0;
   for (Found found; index != end && !run.isFull(); ++index) {
-    if (!tryFind(index, found) || !MessageRun::canHave(found.type) || found.missed() != 0) break;
+    if (!tryFind(index, found) || !MessageRun::canHold(found.type) || found.missed() != 0) break;
     const auto& form = *found.form;
     const auto client = found.number<std::uint32_t>(form.client);
     const auto id = found.number<std::uint32_t>(form.requestId);
@@ -202,7 +202,7 @@ PlainItems PlainFrame::readRun(std::uint32_t index, std::uint32_t end,
                                .timeNs = found.number<std::int64_t>(form.timeStamp)},
                               1, layout::kFirstSlotBodyBytes));
     withPlainType(found.type, [&]<class T>(std::type_identity<T>) {
-      if constexpr (MessageRun::canHave(T::kType))
+      if constexpr (MessageRun::canHold(T::kType))
         run.add(std::bit_cast<FirstBody>(bodyOf<T>(found.bytes, form)));
       return true;
     });
@@ -254,7 +254,8 @@ void PlainRun::append(const PlainItems& items, std::size_t index) {
   putNumber(bytes + form.client, numbers.client);
   putNumber(bytes + form.requestId, numbers.requestId);
   if (!isRequest) {
-    if (numbers.isFirst) bytes[form.isFirst / 8] |= static_cast<kj::byte>(1u << (form.isFirst % 8));
+    if (numbers.isFirst)
+      bytes[form.isFirstBit / 8] |= static_cast<kj::byte>(1u << (form.isFirstBit % 8));
     putNumber(bytes + form.missed, numbers.missed);
   }
   putNumber(bytes + form.clientType, numbers.clientType);
@@ -284,7 +285,7 @@ void PlainRun::buildHead() {
   auto* item = words + listAt + 1;
   for (const auto& sent : items_) {
     const auto& kind = forms.kind(sent.isRequest);
-    storeLittle({reinterpret_cast<kj::byte*>(item), itemWords * kWordBytes}, forms.itemWhich,
+    storeLittle({reinterpret_cast<kj::byte*>(item), itemWords * kWordBytes}, forms.kindByte,
                 kind.number);
     auto* const pointer = item + forms.itemPointer;
     const auto target = payloadAt + sent.word;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PlainItem: a request without a deadline, or a reply, with a message of fixed size.
-// PlainItems: several of them together.
+// PlainItems: plain items of one client and kind.
 // PlainFrame: reads the plain items of a frame in place.
 // PlainRun: builds a frame of plain items.
 //
@@ -56,7 +56,8 @@ struct PlainItem {
 };
 
 // Items of one client: requests, first replies, or further replies without missed ones. The words
-// of a message in `run` contain its requestId, clientType, clientExtra and time stamp.
+// of a message in `run` contain its requestId, clientType, clientExtra and time stamp. `run`
+// outlives this object and does not change meanwhile.
 struct PlainItems {
   bool isRequest;
   bool isFirst;
@@ -78,12 +79,13 @@ class PlainFrame {
   // Reads the item at `index`, which must be less than the number of items that Cap'n Proto finds.
   // Returns false, and `item` may have changed, when it is not plain.
   [[nodiscard]] bool tryRead(std::uint32_t index, PlainItem& item) const noexcept;
-  // Reads the items from `index` to `end` that may be handled together with that at `index`, which
-  // is the first one. Their request numbers are not 0; those of requests and of first replies move
-  // away from the first one, beyond the highest number to the lowest, so that none comes twice.
-  // Sets `run` to them; it may have one or none.
-  [[nodiscard]] PlainItems readRun(std::uint32_t index, std::uint32_t end,
-                                   MessageRun& run) const noexcept;
+  // Reads consecutive plain items from `index` on, before `end`, of one client, type and kind
+  // (request, first or further reply). Stops before a request number 0. For requests and first
+  // replies, it also stops before a number that is not farther from the first one (modulo 2^32)
+  // than the number before, so no number occurs twice. Fills `run`, perhaps with one message or
+  // none.
+  [[nodiscard]] PlainItems readItems(std::uint32_t index, std::uint32_t end,
+                                     MessageRun& run) const noexcept;
 
  private:
   struct Found;
@@ -104,7 +106,7 @@ class PlainRun {
   void clear() noexcept;
   [[nodiscard]] bool isFull() const noexcept { return payloadWords_ >= kMaxWords; }
   [[nodiscard]] std::size_t size() const noexcept { return items_.size(); }
-  // Append an item; the one at `index` of several. The run must not be full.
+  // Append an item; item `index` of `items`. The run must not be full.
   void append(const PlainOutgoing& item);
   void append(const PlainItems& items, std::size_t index);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// MessageRun: messages of one type that are taken or sent together, with the envelope of each.
+// MessageRun: messages of one type that are taken or sent together, with the envelope of each. The
+// time in an envelope is the time stamp of a reply; requests in a run have no deadline.
 //
 // Threads  plain data.
 #pragma once
@@ -21,15 +22,14 @@ class MessageRun {
  public:
   static constexpr std::size_t kMost = ValueRun::kMost;
   // Whether the bodies of this type fill a slot each. Only such messages may be in a run.
-  [[nodiscard]] static constexpr bool canHave(MessageType type) noexcept {
+  [[nodiscard]] static constexpr bool canHold(MessageType type) noexcept {
     const auto& body = layoutOf(type);
     return body.headerBytes == layout::kFirstSlotBodyBytes && body.elementBytes == 0;
   }
 
   MessageRun() noexcept : MessageRun(MessageType::none) {}
   //   flags  of the slot of each message
-  explicit MessageRun(MessageType type, std::uint8_t flags = 0) noexcept
-      : type_(type), body_(EnvelopeWords::fullSlot(static_cast<std::uint16_t>(type), flags)) {}
+  explicit MessageRun(MessageType type, std::uint8_t flags = 0) noexcept { begin(type, flags); }
 
   // Empties the run, for messages of this type.
   void begin(MessageType type, std::uint8_t flags = 0) noexcept {
@@ -73,8 +73,8 @@ class MessageRun {
   }
 
  private:
-  MessageType type_;
-  std::uint64_t body_;
+  MessageType type_{};
+  std::uint64_t body_ = 0;
   std::size_t count_ = 0;
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): only the first `count_` have a value
   std::array<EnvelopeWords, kMost> words_;

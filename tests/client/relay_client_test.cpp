@@ -28,7 +28,7 @@ MessageRun int32Run(const std::vector<std::uint32_t>& ids) {
   for (const auto id : ids) {
     run.add(EnvelopeWords::of({.requestId = id,
                                .clientType = static_cast<std::int32_t>(id) + 100,
-                               .timeNs = 1},  // no deadline
+                               .timeNs = 1},  // sendAs() ignores it
                               1, layout::kFirstSlotBodyBytes));
     const Int32 body{.value = static_cast<std::int32_t>(id)};
     run.add(FirstBody::of(reinterpret_cast<const std::byte*>(&body)));
@@ -99,8 +99,8 @@ class RelayRunReceiverTest : public RelayTest, private RunReceiver {
     EXPECT_EQ(server_->reply(std::move(message)), ReplyResult::sent);
   }
   std::size_t room() const noexcept override { return room_; }
-  void onRun(const MessageRun& run, bool areFirst) override {
-    std::string text = areFirst ? "first" : "further";
+  void onRun(const MessageRun& run, bool isFirst) override {
+    std::string text = isFirst ? "first" : "further";
     for (std::size_t at = 0; at < run.size(); ++at) {
       text += ' ' + std::to_string(run.message(at).tryAs<Int32>()->value);
       EXPECT_NE(run[at].requestId(), 0u);
@@ -157,7 +157,7 @@ TEST_F(RelayRunReceiverTest, GetsNoReplyToARequestThatHasHadItsFate) {
   messages_.clear();
 }
 
-// Other clients of the dispatcher have their turn after about as many messages as without runs.
+// Other clients of the dispatcher have their turn after at most 15 more messages than without runs.
 TEST_F(RelayRunReceiverTest, GetsOneLongRunInATurn) {
   const auto request = std::move(sendRequests(1).front());
   const auto further = request.duplicate();

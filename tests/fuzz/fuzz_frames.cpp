@@ -69,12 +69,12 @@ void compare(const router::PlainItem& plain, wire::Item::Reader item) {
   const auto hasNumbersOf = [&](auto carrier) {
     return plain.client == carrier.getClient() && plain.requestId == carrier.getRequestId();
   };
-  const bool isOfIt = plain.isRequest
-                          ? hasNumbersOf(item.getRequest())
-                          : hasNumbersOf(item.getReply()) &&
-                                plain.isFirst == item.getReply().getIsFirst() &&
-                                plain.message.getMissed() == item.getReply().getMissed();
-  if (!isSame || !isOfIt) std::abort();
+  const bool hasSameNumbers = plain.isRequest
+                                  ? hasNumbersOf(item.getRequest())
+                                  : hasNumbersOf(item.getReply()) &&
+                                        plain.isFirst == item.getReply().getIsFirst() &&
+                                        plain.message.getMissed() == item.getReply().getMissed();
+  if (!isSame || !hasSameNumbers) std::abort();
 }
 
 void lookAtPlainItems(capnp::MessageReader& frame, capnp::List<wire::Item>::Reader items) {
@@ -85,7 +85,7 @@ void lookAtPlainItems(capnp::MessageReader& frame, capnp::List<wire::Item>::Read
   for (capnp::uint at = 0; at < items.size(); ++at) {
     router::PlainItem item;
     if (plain->tryRead(at, item)) compare(item, items[at]);
-    const auto run = plain->readRun(at, items.size(), together);
+    const auto run = plain->readItems(at, items.size(), together);
     for (std::size_t index = 0; index < together.size(); ++index)
       compare(run[index], items[at + static_cast<capnp::uint>(index)]);
   }

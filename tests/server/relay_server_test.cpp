@@ -110,7 +110,7 @@ TEST_F(RelayTest, AServerGetsTheDeadlineOfARequest) {
 class RelayRunTest : public RelayTest {
  protected:
   RelayRunTest() {
-    startWatched(128);  // a run ends with a batch of the ring, which is 16 now
+    startWatched(128);  // a run ends with a batch of the ring: 16 slots for this queue size
     bindByHand();
   }
   void sendValues(std::int32_t first, std::int32_t count) {
@@ -153,7 +153,7 @@ TEST_F(RelayRunTest, ReceivesRequestsThatWaitTogether) {
   }
 }
 
-TEST_F(RelayRunTest, ReceivesAsManyAsItMay) {
+TEST_F(RelayRunTest, TakesAtMostAsManyAsAsked) {
   sendValues(1, 4);
 
   const auto one = receive(1);

@@ -93,11 +93,11 @@ std::vector<std::string> readPlain(const Words& segment, std::size_t items) {
   return texts;
 }
 
-// Expects that items that are read together are read as each of them.
+// Expects that readItems() returns what tryRead() does.
 void compareRuns(const PlainFrame& frame, std::uint32_t items) {
   MessageRun run;
   for (std::uint32_t at = 0; at < items; ++at) {
-    const auto read = frame.readRun(at, items, run);
+    const auto read = frame.readItems(at, items, run);
     ASSERT_LE(at + run.size(), items);
     for (std::size_t index = 0; index < run.size(); ++index) {
       PlainItem item;
@@ -217,7 +217,7 @@ std::size_t runLength(std::vector<PlainItem> items) {
   const auto segment = runOf(items);
   const auto frame = PlainFrame::tryOpen(arrayOf(segment));
   MessageRun run;
-  const auto read = frame->readRun(0, static_cast<std::uint32_t>(items.size()), run);
+  const auto read = frame->readItems(0, static_cast<std::uint32_t>(items.size()), run);
   for (std::size_t at = 0; at < run.size(); ++at)
     EXPECT_EQ(describe(read[at]), describe(items[at])) << at;
   return run.size();
@@ -246,7 +246,7 @@ TEST(PlainItems, AreOfOneKindClientAndType) {
   EXPECT_EQ(runLengthWith([](PlainItem&) {}, float64), 0u) << "they do not fit into a slot";
 }
 
-TEST(PlainItems, HaveRisingNumbersIfEachEndsOrBeginsARequest) {
+TEST(PlainItems, HaveRisingNumbersIfTheyAreRequestsOrFirstReplies) {
   const auto setId = [](std::uint32_t id) {
     return [id](PlainItem& item) { item.requestId = id; };
   };
@@ -273,7 +273,7 @@ TEST(PlainItems, HaveRisingNumbersIfEachEndsOrBeginsARequest) {
       1u);
 }
 
-// Each is less than 2^31 behind the one before.
+// Each is less than 2^31 above the one before.
 TEST(PlainItems, DoNotHaveANumberTwice) {
   std::vector<PlainItem> items;
   for (const std::uint32_t id : {1u, 0x80000000u, UINT32_MAX, 1u}) items.push_back(int32Item(id));
