@@ -217,7 +217,7 @@ void Binding::takeFirstReplies(const Message& first, ValueRun& run) noexcept {
 // each is a further one. Returns false, and has delivered nothing, if `first` is alone.
 bool Binding::tryDeliverRun(const Message& first) {
   if (!MessageRun::canHold(first.getType()) || first.body().size() != layout::kFirstSlotBodyBytes ||
-      first.getMissed() != 0)
+      first.getMissed() != 0 || !channel().hasMessage())
     return false;
   const auto most = std::min(runs_->room(), MessageRun::kMost);
   if (most < 2) return false;

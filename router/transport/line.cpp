@@ -154,8 +154,10 @@ bool Line::handleSome() {
   NoticeBatch notices;
   capnp::uint handled = 0;  // items and frames, since the last look
   while (!queue_.hasMaxAnswers()) {
-    if (handled >= kItemsPerCheck && Clock::nowNs() >= endNs) return false;
-    if (handled >= kItemsPerCheck) handled = 0;
+    if (handled >= kItemsPerCheck) {
+      if (Clock::nowNs() >= endNs) return false;
+      handled = 0;
+    }
     if (!items_ && !tryNextFrame()) return true;
     if (!items_ || nextItem_ == items_->size()) {
       items_.reset();
@@ -273,8 +275,8 @@ void Line::send(const PlainOutgoing& item) {
 }
 
 void Line::send(const PlainItems& items) {
-  for (std::size_t at = 0; isEnding() && at < items.run.size(); ++at) queue_.reject(items[at]);
-  if (!isEnding()) enqueue(items);
+  if (!isEnding()) return enqueue(items);
+  for (std::size_t at = 0; at < items.run.size(); ++at) queue_.reject(items[at]);
 }
 
 // Writes after all tasks that are ready now, so that what they send shares the frame.

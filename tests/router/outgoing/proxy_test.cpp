@@ -25,7 +25,7 @@ class ProxyTest : public RouterPartsTest {
       ++together_;
       proxy_->reply(items);
     };
-    startGreeted();
+    startGreeted(greeting([](auto greeting) { greeting.setMaxClients(1); }));
     connection_.emplace(*line_, record_, context_.log, "far:9900", [] {});
     proxy_.emplace(context_, *connection_, router::ServerName{1, "echo"},
                    Proxy::Offer{.binding = 1,
@@ -132,6 +132,16 @@ TEST_F(ProxyTest, RepliesThatComeTogetherMayNotExceedTheWindow) {
   send(frameOf(replies));
 
   EXPECT_THAT(farewell(), HasSubstr("beyond its window of 1048576 bytes"));
+}
+
+TEST_F(ProxyTest, RequestsThatWaitTogetherAreRefusedIfThePeerAcceptsNoMoreClients) {
+  Caller second(dispatcher_);
+  runClientUntil([&] { return second.isConnected(); });
+  for (int count = 0; count < 2; ++count) second.send(Int32Message());
+
+  runClientUntil([&] { return second.messages.size() == 2; });
+
+  for (int count = 0; count < 2; ++count) EXPECT_EQ(fateOf(second.take()), Fate::refused);
 }
 
 // Far more replies than the client has room for, before it receives the first one.

@@ -305,10 +305,16 @@ TEST_F(LinePlainTest, ReturnsRequestsThatWereNeverWritten) {
   peer_ = nullptr;
   settle();
   line_->send(plain(5));
+  MessageRun run(MessageType::int32);
+  for (const std::uint32_t id : {6, 7}) {
+    run.add(EnvelopeWords::of({.requestId = id}, 1, layout::kFirstSlotBodyBytes));
+    run.add(FirstBody{});
+  }
+  line_->send(router::PlainItems{true, false, 1, run});
 
   std::vector<std::uint32_t> ids;
   for (const auto& request : line_->takeUnsentRequests()) ids.push_back(request.requestId);
-  EXPECT_THAT(ids, ElementsAre(2, 3, 4, 5));
+  EXPECT_THAT(ids, ElementsAre(2, 3, 4, 5, 6, 7));
 }
 
 TEST_F(LinePlainTest, HasNoRoomWhileItsQueueIsFull) {
