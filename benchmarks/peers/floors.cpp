@@ -2,9 +2,7 @@
 // Floors: the time that the machine itself needs. No message system that uses the same means can be
 // faster.
 #include <fcntl.h>
-#include <linux/futex.h>
 #include <sys/mman.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <bit>
@@ -14,6 +12,7 @@
 #include <mpf/file_descriptor.h>
 
 #include "base/system_call.h"
+#include "benchmarks/peers/bounced_word.h"
 #include "benchmarks/stage/measurement.h"
 #include "benchmarks/stage/timing.h"
 #include "benchmarks/stage/touch.h"
@@ -21,41 +20,6 @@
 
 namespace mpf::bench {
 namespace {
-
-using Word = std::atomic<std::uint32_t>;
-
-struct alignas(kLineBytes) Line {
-  Word word{0};
-};
-
-// Two lines, one for each direction. What the sender wrote before post() is visible after wait().
-struct Bounce {
-  Line request;
-  Line reply;
-};
-
-struct Spinning {
-  static void post(Word& word, std::uint32_t value) noexcept {
-    // PAIR(bench-bounce): a process that sees the value sees everything written before it.
-    word.store(value, std::memory_order_release);
-  }
-  static void wait(const Word& word, std::uint32_t value) noexcept {
-    // PAIR(bench-bounce): see post().
-    while (word.load(std::memory_order_acquire) != value) cpuRelax();
-  }
-};
-
-struct Asleep {
-  static void post(Word& word, std::uint32_t value) noexcept {
-    Spinning::post(word, value);
-    ::syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
-  }
-  static void wait(const Word& word, std::uint32_t value) noexcept {
-    // PAIR(bench-bounce): see post().
-    while (word.load(std::memory_order_acquire) != value)
-      ::syscall(SYS_futex, &word, FUTEX_WAIT, value - 1, nullptr, nullptr, 0);
-  }
-};
 
 // A bounce in which the server and the requester each call `work` before they post.
 template <class Wait>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The rows of `mpf bench remote` about round trips: the manual's table, and arrays of 1 MiB.
 #include "benchmarks/peers/mpf_peer.h"
+#include "benchmarks/remote/bare_peer.h"
 #include "benchmarks/remote/remote.h"
 #include "benchmarks/remote/routers.h"
 #include "benchmarks/remote/tcp_peer.h"
@@ -11,6 +12,9 @@ namespace {
 
 constexpr std::size_t kInt32 = 4;
 constexpr std::size_t kArray = 1u << 20;
+// Bytes of a frame of Int32 messages, as routers write it: its head, and each message.
+constexpr std::size_t kFrameHead = 32;
+constexpr std::size_t kFrameItem = 96;
 
 using PeerMaker = std::function<std::shared_ptr<Peer>()>;
 
@@ -27,6 +31,7 @@ Outcome goThereAndBack(const Stage& stage, const std::shared_ptr<Peer>& peer,
                        const Traffic& traffic, int writer) {
   Workload workload;
   workload.stopsByItself = true;
+  workload.scratchBytes = kBareScratchBytes;
   workload.server = [=](const RunContext& context) { peer->serve(context); };
   workload.requester = [=, &stage](const RunContext& context) {
     peer->connect(context);
@@ -90,6 +95,20 @@ Measurement remoteRow(const Place& place, const std::string& question, const std
   return row;
 }
 
+// Frames of as many bytes as routers write for these messages.
+Measurement bareRow(const Place& place, const std::string& question, const std::string& name,
+                    int messages) {
+  auto row = rowAt(place, question, "four bare processes, " + name, false);
+  row.mode = Mode::block;
+  row.bytes = kInt32;
+  row.run = [=, between = place.between](const Stage& stage) {
+    const auto frameBytes = kFrameHead + kFrameItem * static_cast<std::size_t>(messages);
+    const std::shared_ptr<Peer> peer = makeBarePeer(between, frameBytes);
+    return goThereAndBack(stage, peer, {1, messages}, Meter::kNobody);
+  };
+  return row;
+}
+
 Measurement besides(Measurement row, const std::string& rawTcp) {
   row.floorName = "raw TCP, " + rawTcp;
   row.floorBytes = row.bytes;
@@ -114,6 +133,8 @@ std::vector<Measurement> messageRows(const Place& place, bool withLocal) {
     rows.push_back(besides(localRow(place, kMessages, "100 buffered", hundred), gathered));
     rows.push_back(besides(localRow(place, kMessages, "1000 buffered", thousand), gathered1000));
   }
+  rows.push_back(besides(bareRow(place, kMessages, none, 1), none));
+  rows.push_back(besides(bareRow(place, kMessages, "frames of 100", 100), gathered));
   rows.push_back(besides(remoteRow(place, kMessages, none, one, kInt32), none));
   rows.push_back(besides(remoteRow(place, kMessages, "100 buffered", hundred, kInt32), gathered));
   rows.push_back(

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "benchmarks/remote/tcp_peer.h"
 
-#include <arpa/inet.h>
 #include <fcntl.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
-#include <signal.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <stdexcept>
@@ -16,6 +11,7 @@
 #include <mpf/file_descriptor.h>
 
 #include "base/system_call.h"
+#include "benchmarks/remote/tcp_ends.h"
 
 namespace mpf::bench {
 namespace {
@@ -26,7 +22,12 @@ class TcpPeer final : public Peer {
 
   void serve(const RunContext& context) override {
     options_.between.enterServer();
-    accept(context);
+    const TcpListener listener(options_.between.serverAddress());
+    context.ready(listener.port());
+    fd_ = listener.accept();
+    // Only the client reads while it waits to write. That suffices to prevent a deadlock.
+    options_.reads = false;
+    prepare();
     for (bool last = false; !last;) {
       takeUnit();
       last = context.stopping();
@@ -36,10 +37,7 @@ class TcpPeer final : public Peer {
 
   void connect(const RunContext& context) override {
     options_.between.enterRequester();
-    fd_ = FileDescriptor(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
-    const auto address = addressOf(context.port());
-    checkCall(::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
-              "connect", options_.between.serverAddress());
+    fd_ = connectTcp(options_.between.serverAddress(), context.port());
     if (options_.reads) checkCall(::fcntl(fd_.get(), F_SETFL, O_NONBLOCK), "fcntl");
     prepare();
   }
@@ -50,34 +48,7 @@ class TcpPeer final : public Peer {
   void receive() override { takeUnit(); }
 
  private:
-  [[nodiscard]] sockaddr_in addressOf(std::uint16_t port) const {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(port);
-    ::inet_pton(AF_INET, options_.between.serverAddress().c_str(), &address.sin_addr);
-    return address;
-  }
-  void accept(const RunContext& context) {
-    // Only the client reads while it waits to write. That suffices to prevent a deadlock.
-    options_.reads = false;
-    const FileDescriptor listener(
-        checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
-    auto address = addressOf(0);
-    socklen_t length = sizeof address;
-    checkCall(::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), length), "bind",
-              options_.between.serverAddress());
-    checkCall(::listen(listener.get(), 1), "listen");
-    checkCall(::getsockname(listener.get(), reinterpret_cast<sockaddr*>(&address), &length),
-              "getsockname");
-    context.ready(ntohs(address.sin_port));
-    fd_ = FileDescriptor(checkCall(::accept(listener.get(), nullptr, nullptr), "accept"));
-    prepare();
-  }
   void prepare() {
-    ::signal(SIGPIPE, SIG_IGN);  // NOLINT(cert-err33-c): cannot fail
-    const int on = 1;
-    checkCall(::setsockopt(fd_.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on), "setsockopt",
-              "TCP_NODELAY");
     out_.assign(options_.unitBytes, std::byte{1});
     in_.assign(options_.unitBytes, std::byte{0});
   }

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/system_call.h"
+#include "benchmarks/remote/bare_peer.h"
 #include "benchmarks/remote/routers.h"
 #include "benchmarks/remote/surroundings.h"
 #include "benchmarks/remote/tcp_peer.h"
@@ -29,11 +30,11 @@ ino_t netOf(const std::string& process) {
   return ::stat(("/proc/" + process + "/ns/net").c_str(), &file) == 0 ? file.st_ino : 0;
 }
 
-// Sends units and receives their echoes, `window` of them at a time.
-void expectToEcho(const Surroundings& between, std::size_t unitBytes, int window) {
-  const std::shared_ptr<Peer> peer = makeTcpPeer({between, unitBytes, window > 1});
+// Sends requests and receives their replies, `window` of them at a time. Returns what went wrong.
+std::string exchange(const std::shared_ptr<Peer>& peer, int window) {
   Workload workload;
   workload.stopsByItself = true;
+  workload.scratchBytes = kBareScratchBytes;
   workload.server = [peer](const RunContext& context) { peer->serve(context); };
   workload.requester = [&](const RunContext& context) {
     peer->connect(context);
@@ -45,7 +46,11 @@ void expectToEcho(const Surroundings& between, std::size_t unitBytes, int window
     peer->roundTrip();
   };
 
-  EXPECT_EQ(stageOnTwo().run(workload).error, "")
+  return stageOnTwo().run(workload).error;
+}
+
+void expectToEcho(const Surroundings& between, std::size_t unitBytes, int window) {
+  EXPECT_EQ(exchange(makeTcpPeer({between, unitBytes, window > 1}), window), "")
       << unitBytes << " bytes, " << window << " at a time";
 }
 
@@ -57,6 +62,11 @@ TEST(TcpPeer, EchoesOnLoopback) {
 // More data than the buffers between both sides hold causes no deadlock.
 TEST(TcpPeer, EchoesMoreThanTheBuffersHold) {
   expectToEcho(Surroundings::loopback(), 1u << 20, 40);
+}
+
+TEST(BarePeer, CarriesFrames) {
+  EXPECT_EQ(exchange(makeBarePeer(Surroundings::loopback(), 128), 1), "");
+  EXPECT_EQ(exchange(makeBarePeer(Surroundings::loopback(), 1u << 20), 1), "");
 }
 
 // Skipped where this user may not create namespaces.
@@ -76,6 +86,7 @@ class NamespacesTest : public testing::Test {
 TEST_F(NamespacesTest, JoinBothSides) {
   expectToEcho(between_, 4, 1);
   expectToEcho(between_, 1u << 20, 4);
+  EXPECT_EQ(exchange(makeBarePeer(between_, 128), 1), "");
 }
 
 TEST_F(NamespacesTest, LeaveTheCreatingProcessInItsOwn) {
