@@ -62,7 +62,7 @@ std::string handledText(const Tree& handling) {
   return what;
 }
 
-bool isTrouble(const Tree& tree) { return !at(tree, "problem").is_null(); }
+bool hasProblem(const Tree& tree) { return !at(tree, "problem").is_null(); }
 
 std::string summaryOfHandling(const Tree& capsule) {
   std::string all;
@@ -87,7 +87,7 @@ std::string messagesText(const Tree& link, const char* ring, const char* title) 
   for (const auto& message : messages) {
     table.add({text(message, "requestId"), text(message, "state"),
                at(message, "answered").is_null() ? "" : text(message, "answered"),
-               text(message, isTrouble(message) ? "problem" : "text")});
+               text(message, hasProblem(message) ? "problem" : "text")});
   }
   return table.fitted("    ");
 }
@@ -98,7 +98,7 @@ std::string linksText(const Tree& links) {
   for (const auto& link : links) {
     const auto& requests = at(link, "requests");
     table.add({text(link, "client"), text(link, "clientPid"),
-               isTrouble(link) ? text(link, "problem") : text(link, "clientState"),
+               hasProblem(link) ? text(link, "problem") : text(link, "clientState"),
                text(requests, "sent"), text(requests, "taken"), text(requests, "waiting"),
                text(requests, "unanswered"), text(at(link, "replies"), "sent")});
   }
@@ -114,7 +114,7 @@ std::string linksText(const Tree& links) {
 std::string serverText(const Tree& server) {
   auto all =
       fmt::format("\nserver \"{}\" at location {}", text(server, "name"), text(server, "location"));
-  if (isTrouble(server)) return all + ": " + text(server, "problem") + "\n";
+  if (hasProblem(server)) return all + ": " + text(server, "problem") + "\n";
   all += '\n';
   const auto& handling = at(server, "handling");
   if (handling.is_object()) {
@@ -164,7 +164,7 @@ std::string frameText(const Tree& frame) {
 std::string coreText(const Tree& capsule) {
   const auto& core = at(capsule, "core");
   if (!core.is_object()) return {};
-  if (isTrouble(core)) return fmt::format("\ncore: {}\n", text(core, "problem"));
+  if (hasProblem(core)) return fmt::format("\ncore: {}\n", text(core, "problem"));
   const auto& cause = at(capsule, "cause");
   auto all = fmt::format("\ncore {}\n", text(core, "file"));
   auto reason = fmt::format(", which received {}{}", text(cause, "name"), reasonText(cause, core));
@@ -177,7 +177,8 @@ std::string coreText(const Tree& capsule) {
 
 std::string logText(const Tree& log) {
   if (!log.is_object()) return {};
-  if (isTrouble(log)) return fmt::format("\nlog {}: {}\n", text(log, "file"), text(log, "problem"));
+  if (hasProblem(log))
+    return fmt::format("\nlog {}: {}\n", text(log, "file"), text(log, "problem"));
   const auto& lines = at(log, "text");
   return fmt::format(
       "\nend of {}:\n{}", text(log, "file"),

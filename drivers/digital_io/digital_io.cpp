@@ -89,7 +89,7 @@ DigitalIo::DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options
   thread_ = std::make_unique<InterruptThread>(
       usesInterrupts_ ? module.interrupt(0) : *noInterrupt_, threadOptions,
       [this](InterruptThread::Cause cause) { return serve(cause); },
-      [this](InterruptTrouble trouble) { note(trouble); });
+      [this](InterruptFault fault) { note(fault); });
 }
 
 DigitalIo::~DigitalIo() {
@@ -297,8 +297,8 @@ void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
 
 // Lost interrupts are found by noteLateness(), which compares edges, and a carrier that polls
 // reports that itself.
-void DigitalIo::note(InterruptTrouble trouble) {
-  if (trouble != InterruptTrouble::storm) return;
+void DigitalIo::note(InterruptFault fault) {
+  if (fault != InterruptFault::storm) return;
   const std::lock_guard lock(mutex_);
   report({DigitalIoChange::Kind::storm, state_.inputs, 0});
 }

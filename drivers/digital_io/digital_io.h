@@ -149,7 +149,7 @@ class DigitalIo {
   bool setUp();
   void restoreOutputs();
   void noteLateness(InterruptThread::Cause cause, bool hadEdges);
-  void note(InterruptTrouble trouble);
+  void note(InterruptFault fault);
   void report(const DigitalIoChange& change);
   [[nodiscard]] std::uint32_t edges() const noexcept { return rising_ | falling_; }
   [[nodiscard]] std::uint32_t armed() const noexcept {

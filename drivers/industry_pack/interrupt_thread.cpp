@@ -24,11 +24,11 @@ constexpr int kPausesToCalm = 2;         // after them a line that was enabled a
 }  // namespace
 
 InterruptThread::InterruptThread(Interrupt& interrupt, InterruptThreadOptions options,
-                                 Handler handler, TroubleHandler trouble)
+                                 Handler handler, FaultHandler fault)
     : interrupt_(interrupt),
       options_(options),
       handler_(std::move(handler)),
-      trouble_(std::move(trouble)),
+      fault_(std::move(fault)),
       wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd",
                         "for an interrupt thread")),
       isPolled_(interrupt_.isPolled()) {  // a carrier that polls from the start reports that itself
@@ -90,7 +90,7 @@ void InterruptThread::serveInterrupt() {
 void InterruptThread::servePoll() {
   if (handler_(Cause::poll)) {
     late_.fetch_add(1, std::memory_order_relaxed);
-    if (!isPaused() && ++lateInRow_ == options_.lateLimit) report(InterruptTrouble::never);
+    if (!isPaused() && ++lateInRow_ == options_.lateLimit) report(InterruptFault::never);
   }
   const auto period =
       isPaused() && options_.pollEvery.count() == 0 ? kPollWhilePaused : options_.pollEvery;
@@ -102,7 +102,7 @@ void InterruptThread::pause() {
   storms_.fetch_add(1, std::memory_order_relaxed);
   pausedUntil_ = Deadline::after(options_.stormPause);
   stormEnds_ = Deadline::never();
-  if (!isStorming_.exchange(true, std::memory_order_relaxed)) report(InterruptTrouble::storm);
+  if (!isStorming_.exchange(true, std::memory_order_relaxed)) report(InterruptFault::storm);
   servePoll();
 }
 
@@ -125,11 +125,11 @@ void InterruptThread::endStorm() {
 void InterruptThread::followPolling() {
   if (isPolled_ || !interrupt_.isPolled()) return;
   isPolled_ = true;
-  report(InterruptTrouble::polled);
+  report(InterruptFault::polled);
 }
 
-void InterruptThread::report(InterruptTrouble trouble) const {
-  if (trouble_) trouble_(trouble);
+void InterruptThread::report(InterruptFault fault) const {
+  if (fault_) fault_(fault);
 }
 
 void InterruptThread::wait() const {

@@ -36,7 +36,7 @@ void expectKind(const IdProm& prom, const ModuleKind& kind, const std::string& w
 
 IdProm readChecked(IndustryPackSite& site, const ModuleKind& kind, const std::string& where) {
   const auto prom = readIdProm(site.id(), where);
-  if (!prom.isCrcRight) {
+  if (!prom.hasValidCrc) {
     throw IndustryPackError(IndustryPackStatus::badCrc,
                             fmt::format("{}: the CRC of the ID PROM is wrong (manufacturer "
                                         "0x{:02x}, model 0x{:02x}); check how the module is seated",

@@ -69,7 +69,7 @@ void OctalUart::startThread(int line) {
   threads_.at(static_cast<std::size_t>(line)) = std::make_unique<InterruptThread>(
       module_.interrupt(line), options,
       [this, line](InterruptThread::Cause cause) { return serve(line, cause); },
-      [this, line](InterruptTrouble trouble) { note(line, trouble); });
+      [this, line](InterruptFault fault) { note(line, fault); });
 }
 
 void OctalUart::onAlarm(AlarmHandler handler) {
@@ -159,29 +159,29 @@ bool OctalUart::servePoll(int line) {
   return isLate;
 }
 
-void OctalUart::note(int line, InterruptTrouble trouble) {
+void OctalUart::note(int line, InterruptFault fault) {
   {
     const std::lock_guard lock(mutex_);
-    raise(trouble == InterruptTrouble::storm ? OctalUartAlarm::storm : OctalUartAlarm::noInterrupts,
-          textOf(line, trouble));
+    raise(fault == InterruptFault::storm ? OctalUartAlarm::storm : OctalUartAlarm::noInterrupts,
+          textOf(line, fault));
   }
   reportAlarms();
 }
 
-std::string OctalUart::textOf(int line, InterruptTrouble trouble) const {
+std::string OctalUart::textOf(int line, InterruptFault fault) const {
   auto which = fmt::format("module \"{}\" ({}), ports {} to {}: interrupt line {}", module_.name(),
                            module_.where(), line * kPortsPerLine,
                            line * kPortsPerLine + kPortsPerLine - 1, line);
-  switch (trouble) {
-    case InterruptTrouble::storm:
+  switch (fault) {
+    case InterruptFault::storm:
       return fmt::format(
           "{} is stuck active without a request of the chip: it is masked for {} ms at a time "
           "until it is released",
           which, options_.stormPause.count());
-    case InterruptTrouble::polled:
+    case InterruptFault::polled:
       return fmt::format(
           "{} is polled by its carrier from now on, which is too slow for fast lines", which);
-    case InterruptTrouble::never:
+    case InterruptFault::never:
       return fmt::format(
           "{} stays inactive although the chip has requests: it is polled every {} ms, which is "
           "too slow for fast lines",

@@ -108,8 +108,8 @@ class OctalUart {
   bool serve(int line, InterruptThread::Cause cause);
   bool serveInterrupt(int line);
   bool servePoll(int line);
-  void note(int line, InterruptTrouble trouble);
-  [[nodiscard]] std::string textOf(int line, InterruptTrouble trouble) const;
+  void note(int line, InterruptFault fault);
+  [[nodiscard]] std::string textOf(int line, InterruptFault fault) const;
   bool serveBlocks(int first, int count);
   std::uint8_t pendingOf(int block);
   void serveBlock(int block, std::uint8_t pending);

@@ -36,7 +36,7 @@ Ti9914Chip::Ti9914Chip(IndustryPackModule& module, const Options& options,
       thread_(
           module.interrupt(0), {.pollEvery = options.idlePollEvery},
           [this](InterruptThread::Cause cause) { return serve(cause); },
-          [this](InterruptTrouble trouble) { report(trouble); }) {
+          [this](InterruptFault fault) { report(fault); }) {
   static_cast<void>(module_.checkedVector(options_.vector));
 }
 
@@ -189,18 +189,18 @@ bool Ti9914Chip::serve(InterruptThread::Cause cause) {
   return hadRequest;
 }
 
-void Ti9914Chip::report(InterruptTrouble trouble) const {
+void Ti9914Chip::report(InterruptFault fault) const {
   if (!options_.onAlarm) return;
   const auto line =
       fmt::format("module \"{}\" ({}): the interrupt line ", module_.name(), module_.where());
-  switch (trouble) {
-    case InterruptTrouble::storm:
+  switch (fault) {
+    case InterruptFault::storm:
       return options_.onAlarm(line +
                               "is stuck active without a request of the chip: it is masked for a "
                               "second at a time until it is released");
-    case InterruptTrouble::polled:
+    case InterruptFault::polled:
       return options_.onAlarm(line + "is polled by its carrier from now on: transfers are slower");
-    case InterruptTrouble::never:
+    case InterruptFault::never:
       return options_.onAlarm(line +
                               "stays inactive although the chip has requests: the chip is polled, "
                               "and transfers are slower");

@@ -51,7 +51,7 @@ class Ti9914Chip {
     // How often the chip is polled while a caller sleeps, and while none does.
     std::chrono::milliseconds pollEvery{5};
     std::chrono::milliseconds idlePollEvery{100};
-    // Called once each time trouble with the interrupt line begins, with a sentence for people; on
+    // Called once each time a fault of the interrupt line begins, with a sentence for people; on
     // the thread of this object.
     std::function<void(const std::string& what)> onAlarm{};
   };
@@ -101,7 +101,7 @@ class Ti9914Chip {
   void collectForCaller();
   void sleep(std::uint32_t wanted, Deadline deadline);
   void enableEvents(bool on);
-  void report(InterruptTrouble trouble) const;
+  void report(InterruptFault fault) const;
 
   IndustryPackModule& module_;
   Registers& io_;

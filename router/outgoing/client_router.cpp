@@ -15,7 +15,7 @@ ClientRouter::ClientRouter(RouterContext& context, const Remote& remote)
       record_(context.statistics.add(layout::RouterRole::client)),
       log_(context.log.forObject()),
       retryDelay_(context.config.limits.firstRetry),
-      connector_(context, remote_),
+      dialer_(context, remote_),
       servers_(context, remote_, *record_, log_) {
   record_->setAddress(remote.address.text());
   record_->setLocations(remote.locations);
@@ -60,7 +60,7 @@ kj::Promise<LineEnd> ClientRouter::runOnce() {
   if (state_ == State::stopping) return LineEnd{"the router is stopping"};
   state_ = State::connecting;
   record_->setState(layout::RouterLineState::connecting);
-  return connector_.connect().then(
+  return dialer_.dial().then(
       [this](kj::Own<kj::AsyncIoStream> stream) { return runLine(kj::mv(stream)); });
 }
 

@@ -8,7 +8,7 @@
 //      └──────────────────┴───────────────────────┘      waits longer each time
 //   any ─ stop() ─► stopping
 //
-//   ClientRouter ─► Connector      opens a connection
+//   ClientRouter ─► Dialer         opens a connection
 //                ├► Line           sends and receives its frames
 //                └► RemoteServers  the servers that local clients use over it, a Proxy for each
 //
@@ -23,7 +23,7 @@
 #include <string>
 
 #include "router/fatal_tasks.h"
-#include "router/outgoing/connector.h"
+#include "router/outgoing/dialer.h"
 #include "router/outgoing/remote_servers.h"
 #include "router/transport/line.h"
 
@@ -64,7 +64,7 @@ class ClientRouter {
   std::chrono::milliseconds retryDelay_;
   std::int64_t connectedNs_ = 0;
   std::minstd_rand random_{std::random_device{}()};
-  Connector connector_;
+  Dialer dialer_;
   std::unique_ptr<Line> line_;
   RemoteServers servers_;
   kj::ForkedPromise<void> loop_ = nullptr;

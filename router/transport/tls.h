@@ -26,7 +26,7 @@ class Tls {
   //   timer      outlives this object
   //   handshake  longest time from the connection to the end of the handshake
   //   throws     ConfigError that names the file and its error
-  Tls(const TlsFiles& files, kj::Timer& timer, std::chrono::milliseconds handshake = kHandshake);
+  Tls(const TlsFiles& files, kj::Timer& timer, std::chrono::milliseconds handshake);
 
   // Resolves with the TLS connection after the handshake. If the handshake fails, tlsProblem() of
   // the exception says why.
@@ -34,8 +34,6 @@ class Tls {
   //   name  the name that the certificate of the peer must have: Remote::tlsName
   [[nodiscard]] kj::Promise<kj::AuthenticatedStream> connect(kj::AuthenticatedStream connection,
                                                              const std::string& name);
-
-  static constexpr std::chrono::seconds kHandshake{10};
 
  private:
   kj::Promise<kj::AuthenticatedStream> limited(kj::Promise<kj::AuthenticatedStream> handshake);

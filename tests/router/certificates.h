@@ -3,7 +3,7 @@
 // makes them in the folder of the test.
 //
 //   const Certificates ours(folder, "ours");
-//   Tls tls(ours.files("ioc1"), timer);       // certificate and key of ioc1, and its authorities
+//   Tls tls(ours.files("ioc1"), timer, 1h);   // certificate and key of ioc1, and its authorities
 #pragma once
 
 #include <string>

@@ -81,7 +81,7 @@ TEST(Board, HasTheIdPromsOfItsModules) {
     EXPECT_EQ(prom.manufacturer, 0xf0U);
     EXPECT_EQ(prom.model, 0x22);
     EXPECT_EQ(prom.revision, 0xa1);
-    EXPECT_TRUE(prom.isCrcRight);
+    EXPECT_TRUE(prom.hasValidCrc);
   }
   EXPECT_THROW(static_cast<void>(readIdProm(carrier.site(2).id(), "IP_c")), IndustryPackError);
 }

@@ -40,7 +40,7 @@ OpenFiles openFilesOf(const Host& host, std::int32_t pid) {
 }
 
 // Why a server cannot accept more clients, or soon cannot; empty when it can.
-std::string troubleOf(const Host& host, const layout::SegmentHeader& header,
+std::string problemOf(const Host& host, const layout::SegmentHeader& header,
                       const layout::WindowControl& control) {
   const auto server = fmt::format("\"{}\" (pid {})", segments::text(header.name), header.ownerPid);
   switch (control.shortage.load(std::memory_order_relaxed)) {
@@ -76,20 +76,20 @@ std::optional<SegmentImage> livingServer(const std::filesystem::path& path) try 
 Finding checkServers(const Host& host) {
   constexpr const char* kName = "open files of servers";
   std::size_t servers = 0;
-  std::vector<std::string> troubles;
+  std::vector<std::string> problems;
   for (const auto& name : host.list("dev/shm")) {
     const auto parsed = SegmentName::tryParse(name);
     if (!parsed || parsed->kind != NameKind::serverWindow) continue;
     const auto image = livingServer(host.root / "dev/shm" / name);
     if (!image) continue;
     ++servers;
-    if (auto trouble = troubleOf(host, image->header(), image->window()); !trouble.empty())
-      troubles.push_back(std::move(trouble));
+    if (auto problem = problemOf(host, image->header(), image->window()); !problem.empty())
+      problems.push_back(std::move(problem));
   }
   if (servers == 0) return {kName, Health::ok, "no server is running", {}};
-  if (troubles.empty()) return {kName, Health::ok, counted(servers, "server"), {}};
-  auto seen = troubles.front();
-  if (troubles.size() > 1) seen += fmt::format("; and {} more", troubles.size() - 1);
+  if (problems.empty()) return {kName, Health::ok, counted(servers, "server"), {}};
+  auto seen = problems.front();
+  if (problems.size() > 1) seen += fmt::format("; and {} more", problems.size() - 1);
   return {kName, Health::problem, seen,
           "start the server with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the systemd "
           "unit"};

@@ -42,7 +42,7 @@ struct Ti9914Options {
 // Opens `start`, one of options.modules. On a carrier of models, each module has a bus of its own
 // with all meters. With --wait it waits for the module, and returns null when SIGINT or SIGTERM
 // arrived meanwhile.
-//   log      outlives the controller, which logs trouble with interrupts
+//   log      outlives the controller, which logs faults of its interrupts
 //   throws  as Hardware::open(), IndustryPackModules::takeVector() and Ti9914Controller;
 //           std::invalid_argument when two meters have the same address, or a meter has a wire and
 //           there is no --wires

@@ -66,22 +66,23 @@ TEST_F(IdPromTest, OfFormatTwoIsReadBack) {
 }
 
 TEST_F(IdPromTest, ReportsAWrongCrc) {
-  EXPECT_FALSE(readIdProm(space({.manufacturer = 0xf0, .model = 0x22, .isCrcRight = false}), "IP_a")
-                   .isCrcRight);
+  EXPECT_FALSE(
+      readIdProm(space({.manufacturer = 0xf0, .model = 0x22, .hasValidCrc = false}), "IP_a")
+          .hasValidCrc);
 }
 
 TEST_F(IdPromTest, ReportsAWrongCrcOfFormatTwo) {
   EXPECT_FALSE(readIdProm(space({.format = IdProm::Format::two,
                                  .manufacturer = 1,
                                  .bytesUsed = 26,
-                                 .isCrcRight = false}),
+                                 .hasValidCrc = false}),
                           "IP_a")
-                   .isCrcRight);
+                   .hasValidCrc);
 }
 
 TEST_F(IdPromTest, WithMoreBytesUsedThanExistHasAWrongCrc) {
   const IdProm prom{.manufacturer = 0xf0, .model = 0x22, .bytesUsed = 255};
-  EXPECT_FALSE(readIdProm(space(prom), "IP_a").isCrcRight);
+  EXPECT_FALSE(readIdProm(space(prom), "IP_a").hasValidCrc);
 }
 
 TEST_F(IdPromTest, IsRefusedWhenNothingAnswers) {

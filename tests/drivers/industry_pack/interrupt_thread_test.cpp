@@ -107,8 +107,8 @@ TEST_F(InterruptThreadTest, MasksAStormDespiteTraffic) {
   InterruptThread thread(
       carrier_.site(0).interrupt(0), {.stormLimit = 100, .stormPause = 1h},
       [i = 0](InterruptThread::Cause) mutable { return ++i % 4 == 0; },
-      [&](InterruptTrouble trouble) {
-        EXPECT_EQ(trouble, InterruptTrouble::storm);
+      [&](InterruptFault fault) {
+        EXPECT_EQ(fault, InterruptFault::storm);
         storms.release();
       });
 
@@ -128,7 +128,7 @@ TEST_F(InterruptThreadTest, ToleratesSpuriousInterruptsAmongInterruptsWithAReque
 TEST_F(InterruptThreadTest, ReportsAStormWhenItBeginsAndNotAfterEachPause) {
   std::atomic<int> told = 0;
   InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 10ms},
-                         serve(), [&](InterruptTrouble) { ++told; });
+                         serve(), [&](InterruptFault) { ++told; });
 
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   while (thread.counters().storms < 10) std::this_thread::yield();
@@ -140,8 +140,8 @@ TEST_F(InterruptThreadTest, ReportsAStormWhenItBeginsAndNotAfterEachPause) {
 TEST_F(InterruptThreadTest, AStormEndsWhenTheLineIsReleasedAndTheNextOneIsReportedAgain) {
   std::counting_semaphore<> storms{0};
   InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 1ms},
-                         serve(), [&](InterruptTrouble trouble) {
-                           EXPECT_EQ(trouble, InterruptTrouble::storm);
+                         serve(), [&](InterruptFault fault) {
+                           EXPECT_EQ(fault, InterruptFault::storm);
                            storms.release();
                          });
   EXPECT_FALSE(thread.isStorming());
@@ -168,8 +168,8 @@ TEST_F(InterruptThreadTest, AStormLastsAsLongAsItsPause) {
 TEST_F(InterruptThreadTest, ReportsADeadLineOnce) {
   std::atomic<int> told = 0;
   InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .lateLimit = 3}, serve(),
-                         [&](InterruptTrouble trouble) {
-                           EXPECT_EQ(trouble, InterruptTrouble::never);
+                         [&](InterruptFault fault) {
+                           EXPECT_EQ(fault, InterruptFault::never);
                            ++told;
                          });
   carrier_.setFault("IP_a", ModelFault::interruptsLost);
@@ -187,7 +187,7 @@ TEST_F(InterruptThreadTest, DoesNotReportALineAsDeadThatItHasMasked) {
   InterruptThread thread(
       carrier_.site(0).interrupt(0),
       {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h, .lateLimit = 3}, serve(),
-      [&](InterruptTrouble trouble) { dead += trouble == InterruptTrouble::never ? 1 : 0; });
+      [&](InterruptFault fault) { dead += fault == InterruptFault::never ? 1 : 0; });
   while (thread.counters().storms == 0) std::this_thread::yield();
   for (int i = 0; i < 10; ++i) {
     io().write16(0, 1);

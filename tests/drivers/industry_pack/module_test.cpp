@@ -75,7 +75,7 @@ TEST_F(ModuleTest, OfAnotherModelOfAKnownManufacturerIsRefused) {
 
 TEST_F(ModuleTest, WithAWrongCrcIsRefused) {
   model_->plug("IP_a", std::make_unique<PlainModel>(
-                           IdProm{.manufacturer = 0xa3, .model = 0x11, .isCrcRight = false}));
+                           IdProm{.manufacturer = 0xa3, .model = 0x11, .hasValidCrc = false}));
   expectError(IndustryPackStatus::badCrc, "CRC");
 }
 

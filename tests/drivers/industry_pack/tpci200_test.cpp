@@ -221,8 +221,8 @@ TEST_F(Tpci200Test, ReportsALineThatIsPolledLater) {
   InterruptThread thread(
       carrier.site(0).interrupt(0), {.pollEvery = std::chrono::milliseconds(1)},
       [](InterruptThread::Cause) { return false; },
-      [&](InterruptTrouble trouble) {
-        EXPECT_EQ(trouble, InterruptTrouble::polled);
+      [&](InterruptFault fault) {
+        EXPECT_EQ(fault, InterruptFault::polled);
         isPolled.release();
       });
 

@@ -70,7 +70,7 @@ class ListenerTest : public testing::Test {
   std::string finish(kj::Own<kj::AsyncIoStream> stream) {
     auto called = kj::newPromiseAndFulfiller<std::string>();
     called_ = kj::mv(called.fulfiller);
-    Tls tls(ours_.files("honest"), io_.provider->getTimer());
+    Tls tls(ours_.files("honest"), io_.provider->getTimer(), context_.config.limits.handshakeTime);
     auto connected = tls.connect({kj::mv(stream), kj::UnknownPeerIdentity::newInstance()}, "server")
                          .wait(io_.waitScope);
     auto closed = connected.stream->tryRead(&unread_, 1, 1).then([](std::size_t) -> std::string {
@@ -112,7 +112,8 @@ class ListenerTest : public testing::Test {
       .statistics = statistics_,
       .monitors = monitors_,
       .config = withLongHandshakeTime(),
-      .tls = std::make_shared<Tls>(ours_.files("server"), io_.provider->getTimer())};
+      .tls = std::make_shared<Tls>(ours_.files("server"), io_.provider->getTimer(),
+                                   withLongHandshakeTime().limits.handshakeTime)};
   kj::Own<kj::PromiseFulfiller<std::string>> called_;
   Listener listener_{
       context_,

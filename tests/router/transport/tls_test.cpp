@@ -80,7 +80,7 @@ class TlsTest : public testing::Test {
   }
   // Why the handshake fails on a server side that receives these bytes.
   std::string problemOfAccepting(kj::StringPtr bytes) {
-    Tls server(ours_.files("server"), io_.provider->getTimer());
+    Tls server(ours_.files("server"), io_.provider->getTimer(), 1h);
     auto pipe = io_.provider->newTwoWayPipe();
     Side side;
     auto accepted = watch(server.accept(anonymous(kj::mv(pipe.ends[0]))), side);
@@ -189,7 +189,7 @@ TEST_F(TlsTest, RefusesAServerOfAnotherName) {
 }
 
 TEST_F(TlsTest, RefusesAClientWithoutCertificate) {
-  Tls server(ours_.files("server"), io_.provider->getTimer());
+  Tls server(ours_.files("server"), io_.provider->getTimer(), 1h);
   kj::TlsContext::Options options;
   options.useSystemTrustStore = true;
   kj::TlsContext stranger(options);

@@ -37,7 +37,7 @@ class DeviceModel {
   // byte at the odd address.
   enum Lanes : std::uint16_t { kHigh = 0xff00, kLow = 0x00ff, kBoth = 0xffff };
 
-  //   id  the contents of the ID PROM; with IdProm::isCrcRight false, the PROM has a wrong CRC
+  //   id  the contents of the ID PROM; with IdProm::hasValidCrc false, the PROM has a wrong CRC
   explicit DeviceModel(IdProm id) : id_(id) {}
   DeviceModel(const DeviceModel&) = delete;
   DeviceModel& operator=(const DeviceModel&) = delete;

@@ -29,7 +29,7 @@ struct IdProm {
   std::uint32_t driverId = 0;
   std::uint16_t flags = 0;  // format II only
   std::uint16_t bytesUsed = 12;
-  bool isCrcRight = true;
+  bool hasValidCrc = true;
 
   friend bool operator==(const IdProm&, const IdProm&) = default;
 };
@@ -38,7 +38,7 @@ struct IdProm {
 //
 //   where    the site, for error messages
 //   throws   IndustryPackError noModule when nothing answers, noIpacId when the contents are not an
-//            ID PROM; a wrong CRC is not an error but IdProm::isCrcRight
+//            ID PROM; a wrong CRC is not an error but IdProm::hasValidCrc
 [[nodiscard]] IdProm readIdProm(Registers& idSpace, const std::string& where);
 
 // The 16-bit words of the ID space that readIdProm() reads as `prom`. For device models.

@@ -16,7 +16,7 @@
 //                          └──────────stormLimit─────────┘
 //
 // Traffic does not hide a stuck line: an interrupt with a request compensates only two spurious
-// ones. A driver can pass a second function, which is called once each time when trouble begins: a
+// ones. A driver can pass a second function, which is called once each time a fault begins: a
 // storm, a dead line, or a carrier that polls from now on.
 //
 // Threads  both functions run on this object's thread, one call at a time, with all signals
@@ -45,7 +45,7 @@ struct InterruptThreadOptions {
   int lateLimit = 5;  // polls in a row that found a request, without an interrupt in between
 };
 
-enum class InterruptTrouble : std::uint8_t {
+enum class InterruptFault : std::uint8_t {
   storm,  // the line is stuck; reported once until the storm ends
   polled,  // the carrier gets no interrupts any more and polls from now on
   // the chip has requests, but no interrupt comes; ends with the next interrupt. Not during a storm
@@ -57,12 +57,12 @@ class InterruptThread {
   enum class Cause : std::uint8_t { interrupt, poll };
   // Returns whether the chip had a request.
   using Handler = std::function<bool(Cause)>;
-  using TroubleHandler = std::function<void(InterruptTrouble)>;
+  using FaultHandler = std::function<void(InterruptFault)>;
 
   // Starts the thread and enables the interrupt. `interrupt` must outlive this object.
   //   throws  std::system_error when the thread or its descriptor cannot be created
   InterruptThread(Interrupt& interrupt, InterruptThreadOptions options, Handler handler,
-                  TroubleHandler trouble = {});
+                  FaultHandler fault = {});
   // Disables the interrupt; the handler does not run after return.
   ~InterruptThread();
   InterruptThread(const InterruptThread&) = delete;
@@ -92,14 +92,14 @@ class InterruptThread {
   void resume();
   void endStorm();
   void wait() const;
-  void report(InterruptTrouble trouble) const;
+  void report(InterruptFault fault) const;
   void followPolling();
   [[nodiscard]] bool isPaused() const noexcept { return !pausedUntil_.isNever(); }
 
   Interrupt& interrupt_;
   InterruptThreadOptions options_;
   Handler handler_;
-  TroubleHandler trouble_;
+  FaultHandler fault_;
   FileDescriptor wakeUp_;
   // spurious interrupts less compensation; this and below: used by the thread only
   int spuriousExcess_ = 0;

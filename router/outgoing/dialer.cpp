@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "router/outgoing/connector.h"
+#include "router/outgoing/dialer.h"
 
 #include <fmt/format.h>
 #include <kj/debug.h>
@@ -11,12 +11,12 @@
 namespace mpf::router {
 
 // A name may have several addresses, and the first of them may not answer.
-kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connect() {
+kj::Promise<kj::Own<kj::AsyncIoStream>> Dialer::dial() {
   return withTimeout(fmt::format("the look-up of {}", remote_.address.host), lookUp())
       .then([this](Addresses&& addresses) { return connectToOne(std::move(addresses)); });
 }
 
-kj::Promise<Connector::Addresses> Connector::lookUp() {
+kj::Promise<Dialer::Addresses> Dialer::lookUp() {
   if (lookUp_ == nullptr) lookUp_ = startLookUp().fork();
   return KJ_ASSERT_NONNULL(lookUp_).addBranch().then(
       [this](Addresses&& addresses) -> kj::Promise<Addresses> {
@@ -29,7 +29,7 @@ kj::Promise<Connector::Addresses> Connector::lookUp() {
       });
 }
 
-kj::Promise<Connector::Addresses> Connector::startLookUp() {
+kj::Promise<Dialer::Addresses> Dialer::startLookUp() {
   const auto& address = remote_.address;
   return kj::evalNow(
              [&] { return context_.network.parseAddress(hostForKj(address), address.port); })
@@ -42,7 +42,7 @@ kj::Promise<Connector::Addresses> Connector::startLookUp() {
       });
 }
 
-kj::Exception Connector::stepFailed(const std::string& step, const kj::Exception& error) const {
+kj::Exception Dialer::stepFailed(const std::string& step, const kj::Exception& error) const {
   const auto deadTime = limitText(context_.config.limits, "dead-time");
   const auto why = reasonOf(error);
   const auto text = why == kTimeout
@@ -51,7 +51,7 @@ kj::Exception Connector::stepFailed(const std::string& step, const kj::Exception
   return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
 }
 
-kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectToOne(Addresses addresses) {
+kj::Promise<kj::Own<kj::AsyncIoStream>> Dialer::connectToOne(Addresses addresses) {
   const auto next = addresses.front();
   addresses.erase(addresses.begin());
   return withTimeout(fmt::format("the connection to {}", next), connectTo(next))
@@ -62,7 +62,7 @@ kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectToOne(Addresses addres
       });
 }
 
-kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectTo(const std::string& address) {
+kj::Promise<kj::Own<kj::AsyncIoStream>> Dialer::connectTo(const std::string& address) {
   return context_.network.parseAddress(address).then([this](kj::Own<kj::NetworkAddress> parsed) {
     auto connected = parsed->connectAuthenticated();
     return connected.attach(kj::mv(parsed))

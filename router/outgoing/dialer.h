@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Connector: opens connections to one remote router. It looks up the remote's name, tries its
+// Dialer: opens connections to one remote router. It looks up the remote's name, tries its
 // addresses one after the other, and does the TLS handshake unless the remote uses plain TCP.
 //
 //   look-up ─► address 1 ─ fails ─► address 2 ...
 //   each address: TCP connection ─► TLS handshake
 //
 // A look-up occupies a thread until it ends. One that takes too long continues, and the next
-// connect() waits for it instead of starting another one.
+// dial() waits for it instead of starting another one.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -20,15 +20,15 @@
 
 namespace mpf::router {
 
-class Connector {
+class Dialer {
  public:
   // `context` and `remote` outlive this object.
-  Connector(RouterContext& context, const Remote& remote) : context_(context), remote_(remote) {}
+  Dialer(RouterContext& context, const Remote& remote) : context_(context), remote_(remote) {}
 
   // Resolves with a connection that is ready for the greeting. This object outlives the promise.
   // Each step may take Limits::deadTime.
   //   throws  kj::Exception (the promise): its text names the step that failed, and why
-  [[nodiscard]] kj::Promise<kj::Own<kj::AsyncIoStream>> connect();
+  [[nodiscard]] kj::Promise<kj::Own<kj::AsyncIoStream>> dial();
 
  private:
   using Addresses = std::vector<std::string>;

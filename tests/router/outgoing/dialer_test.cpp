@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Connector: the steps of a connection, and the texts of their failures.
-#include "router/outgoing/connector.h"
+// Dialer: the steps of a connection, and the texts of their failures.
+#include "router/outgoing/dialer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,15 +16,15 @@ namespace {
 
 using testing::HasSubstr;
 
-class ConnectorTest : public testing::Test {
+class DialerTest : public testing::Test {
  public:
-  ~ConnectorTest() noexcept override = default;
+  ~DialerTest() noexcept override = default;
 
  protected:
   // Begins to connect. The look-up waits in io_.network().lookups[0].
   void connect() {
     connecting_ =
-        connector_.connect()
+        dialer_.dial()
             .then([this](kj::Own<kj::AsyncIoStream> stream) { stream_ = kj::mv(stream); },
                   [this](kj::Exception&& error) { problem_ = toStd(error.getDescription()); })
             .eagerlyEvaluate(nullptr);
@@ -33,7 +33,7 @@ class ConnectorTest : public testing::Test {
   void runUntilDone() { connecting_.wait(io_.context().waitScope); }
   auto& lookup() { return *io_.network().lookups.at(0); }
 
-  const mpf::test::Watchdog watchdog_{"connector"};
+  const mpf::test::Watchdog watchdog_{"dialer"};
   const mpf::test::TestBackplane backplane_;
   HeldIo io_;
   Statistics statistics_{backplane_, "test"};
@@ -51,13 +51,13 @@ class ConnectorTest : public testing::Test {
                        .address = parseAddress("slow.lab:9900"),
                        .security = Security::plain,
                        .tlsName = {}};
-  Connector connector_{context_, remote_};
+  Dialer dialer_{context_, remote_};
   kj::Own<kj::AsyncIoStream> stream_;
   std::string problem_;
   kj::Promise<void> connecting_ = nullptr;
 };
 
-TEST_F(ConnectorTest, NamesAFailedLookUp) {
+TEST_F(DialerTest, NamesAFailedLookUp) {
   connect();
 
   lookup().reject(KJ_EXCEPTION(FAILED, "gai_strerror(status) = Name or service not known"));
@@ -66,7 +66,7 @@ TEST_F(ConnectorTest, NamesAFailedLookUp) {
   EXPECT_EQ(problem_, "the look-up of slow.lab failed: Name or service not known");
 }
 
-TEST_F(ConnectorTest, NamesALookUpThatTakesTooLong) {
+TEST_F(DialerTest, NamesALookUpThatTakesTooLong) {
   context_.config.limits.deadTime = std::chrono::milliseconds(20);
   connect();
 
@@ -76,7 +76,7 @@ TEST_F(ConnectorTest, NamesALookUpThatTakesTooLong) {
 }
 
 // A look-up cannot be stopped: another one for each attempt would use up threads.
-TEST_F(ConnectorTest, WaitsForALookUpThatTookTooLongInsteadOfStartingAnother) {
+TEST_F(DialerTest, WaitsForALookUpThatTookTooLongInsteadOfStartingAnother) {
   context_.config.limits.deadTime = std::chrono::milliseconds(20);
   connect();
   runUntilDone();
@@ -96,7 +96,7 @@ TEST_F(ConnectorTest, WaitsForALookUpThatTookTooLongInsteadOfStartingAnother) {
   EXPECT_EQ(io_.network().lookups.size(), 2u) << "each result is used once";
 }
 
-TEST_F(ConnectorTest, RefusesAPublicAddressOverPlainTcp) {
+TEST_F(DialerTest, RefusesAPublicAddressOverPlainTcp) {
   connect();
 
   lookup().fulfill(io_.addressOf("8.8.8.8:9900"));
