@@ -9,6 +9,7 @@ namespace mpf::bench {
 std::string goals(const std::vector<Result>& results) {
   GoalSheet goals(results);
   const std::string idle = "Round trip of 4 B beside";
+  const std::string hundred = "Requests and replies of 4 B with 100 outstanding";
   const auto* small = goals.find("Round trip of 4 B", kMpf, Mode::spin);
   goals.atMost("Int32 round trip, polling, x cache-line bounce, at most",
                goals.ratioToFloor(goals.find("Round trip of 4 B", kMpf, Mode::spin)), 1.1);
@@ -24,10 +25,10 @@ std::string goals(const std::vector<Result>& results) {
   if (const auto* row = goals.find("One way", kMpf, Mode::adaptive))
     goals.atLeast("Int32 one way, adaptive, million a second, at least",
                   row->figures.perSecond / 1e6, 30);
-  if (const auto* row = goals.find("4 B with 100 outstanding", kMpf, Mode::spin))
+  if (const auto* row = goals.find(hundred, kMpf, Mode::spin))
     goals.atLeast("100 outstanding, polling, million a second, at least",
                   row->figures.perSecond / 1e6, 20);
-  if (const auto* row = goals.find("4 B with 100 outstanding", mpfRunPeer().name, Mode::spin))
+  if (const auto* row = goals.find(hundred, mpfRunPeer().name, Mode::spin))
     goals.atLeast("100 outstanding in batches, polling, million a second, at least",
                   row->figures.perSecond / 1e6, 20);
   goals.atMost(

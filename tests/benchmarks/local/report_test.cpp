@@ -114,5 +114,23 @@ TEST(Table, MarksRowsThatWereDisturbed) {
 
 TEST(Goals, AreShownOnlyForRowsThatWereTaken) { EXPECT_EQ(goals({}), ""); }
 
+// A goal names its row; a row that is renamed must not lose it.
+TEST(Goals, AreAllShownForAFullRun) {
+  std::vector<Result> results;
+  for (auto& row : catalogue("mpf-bench-test")) {
+    Result result;
+    result.measurement = std::move(row);
+    result.measurement.skipped.clear();
+    result.figures.perSecond = 1e6;
+    result.ratioToFloor = 1;
+    results.push_back(std::move(result));
+  }
+
+  const auto text = goals(results);
+
+  constexpr std::ptrdiff_t kHead = 2;  // an empty line, and the titles
+  EXPECT_EQ(std::ranges::count(text, '\n'), kHead + 14) << text;
+}
+
 }  // namespace
 }  // namespace mpf::bench
