@@ -3,7 +3,9 @@
 // What a process wrote before post() is visible to the other after wait().
 //
 //   Spinning  looks at the word all the time
-//   Asleep    sleeps in the kernel (futex) until the word changes
+//   Asleep    sleeps in the kernel (futex) until the word changes; only its post() wakes a sleeper
+//
+// The values go up by one.
 #pragma once
 
 #include <linux/futex.h>

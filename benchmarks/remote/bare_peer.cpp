@@ -5,6 +5,10 @@
 #include <sys/socket.h>
 #include <sys/wait.h>
 
+#include <cerrno>
+#include <cstdlib>
+#include <exception>
+#include <functional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -13,11 +17,12 @@
 #include "base/system_call.h"
 #include "benchmarks/peers/bounced_word.h"
 #include "benchmarks/remote/tcp_ends.h"
+#include "benchmarks/stage/processes.h"
 
 namespace mpf::bench {
 namespace {
 
-// Carries frames between a TCP connection and two words, until the connection is closed.
+// Passes frames on between two words and a TCP connection, until the peer closes the connection.
 class Carrier {
  public:
   Carrier(FileDescriptor connection, std::size_t frameBytes)
@@ -40,13 +45,13 @@ class Carrier {
       const auto sent = retryInterrupted([&] {
         return ::send(connection_.get(), out_.data() + done, out_.size() - done, MSG_NOSIGNAL);
       });
-      done += static_cast<std::size_t>(checkCall(sent, "send"));
+      done += static_cast<std::size_t>(checkCall(sent, "send", "a frame"));
     }
   }
   bool hasFrame() {
     const auto got = ::recv(connection_.get(), in_.data() + at_, in_.size() - at_, MSG_DONTWAIT);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) return false;
-    isOpen_ = checkCall(got, "recv") != 0;
+    isOpen_ = checkCall(got, "recv", "a frame") != 0;
     at_ += static_cast<std::size_t>(got);
     if (at_ != in_.size()) return false;
     at_ = 0;
@@ -77,19 +82,24 @@ class BarePeer final : public Peer {
       last = context.stopping();
       Spinning::post(words.reply.word, turn);
     }
-    // Its end would end its carrier, which still carries the last reply.
-    retryInterrupted([&] { return ::waitpid(carrier, nullptr, 0); });
+    awaitEnd(carrier);
   }
 
   void connect(const RunContext& context) override {
     between_.enterRequester();
+    context_ = &context;
+    context.waitsFor("a frame from the server");
     words_ = &wordsOf(context).client;
-    static_cast<void>(
+    carrier_ =
         carry([this, port = context.port()] { return connectTcp(between_.serverAddress(), port); },
-              words_->request.word, words_->reply.word));
+              words_->request.word, words_->reply.word);
   }
   void send() override { Spinning::post(words_->request.word, ++sent_); }
-  void receive() override { Asleep::wait(words_->reply.word, ++received_); }
+  void receive() override {
+    Asleep::wait(words_->reply.word, ++received_);
+    // Its CPU time belongs to this row only if this process has waited for its end.
+    if (context_->stopping()) killProcess(carrier_);
+  }
 
  private:
   struct Words {
@@ -109,13 +119,22 @@ class BarePeer final : public Peer {
         Carrier(connect(), frameBytes_).run(from, to);
       } catch (const std::exception& error) {
         printError("a bare process: {}\n", error.what());
+        std::_Exit(1);
       }
     });
+  }
+  // The end of this process would kill its carrier, which may still have to send the last reply.
+  static void awaitEnd(int carrier) {
+    int status = 0;
+    retryInterrupted([&] { return ::waitpid(carrier, &status, 0); });
+    if (status != 0) throw std::runtime_error("the carrier of the server failed");
   }
 
   Surroundings between_;
   std::size_t frameBytes_;
+  const RunContext* context_ = nullptr;  // of the client; the Stage's, so it outlives this object
   Bounce* words_ = nullptr;
+  int carrier_ = 0;
   std::uint32_t sent_ = 0, received_ = 0;
 };
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Four bare processes: the least that a round trip through two routers can cost. On each side one
-// process sleeps until a word in shared memory changes, and another carries frames between that
-// word and a TCP connection. As routers do during traffic, it polls both and yields the processor.
+// Four bare processes: what a round trip through two routers costs if no process handles a message.
+// On each side one process sleeps at once until a word in shared memory changes, and a carrier
+// passes frames on between these words and a TCP connection. As a router does during traffic, it
+// polls its word and the connection, and yields the processor. Meant for one CPU on each side.
 //
-//   server ─ word ─ carrier ═══ TCP ═══ carrier ─ word ─ client
+//   server ═ two words ═ carrier ═══ TCP ═══ carrier ═ two words ═ client
 //
-// The frames are as long as those of MPF, but nothing writes or reads the messages in them.
+// The frames are as long as those of routers; their bytes mean nothing.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +19,13 @@ namespace mpf::bench {
 
 inline constexpr std::size_t kBareScratchBytes = 4096;  // Workload::scratchBytes
 
-// The peer's send() posts a frame, and receive() waits until it has come back.
+// Bytes of a frame that a router writes for Int32 messages: its head, and each of them.
+[[nodiscard]] constexpr std::size_t bareFrameBytes(std::size_t messages) noexcept {
+  return 32 + 96 * messages;
+}
+
+// send() posts a frame; receive() waits until it has come back. One frame is outstanding at a time:
+// receive() follows each send().
 [[nodiscard]] std::unique_ptr<Peer> makeBarePeer(const Surroundings& between,
                                                  std::size_t frameBytes);
 

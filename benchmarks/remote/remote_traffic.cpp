@@ -12,9 +12,6 @@ namespace {
 
 constexpr std::size_t kInt32 = 4;
 constexpr std::size_t kArray = 1u << 20;
-// Bytes of a frame of Int32 messages, as routers write it: its head, and each message.
-constexpr std::size_t kFrameHead = 32;
-constexpr std::size_t kFrameItem = 96;
 
 using PeerMaker = std::function<std::shared_ptr<Peer>()>;
 
@@ -31,7 +28,7 @@ Outcome goThereAndBack(const Stage& stage, const std::shared_ptr<Peer>& peer,
                        const Traffic& traffic, int writer) {
   Workload workload;
   workload.stopsByItself = true;
-  workload.scratchBytes = kBareScratchBytes;
+  workload.scratchBytes = kBareScratchBytes;  // other peers do not use it
   workload.server = [=](const RunContext& context) { peer->serve(context); };
   workload.requester = [=, &stage](const RunContext& context) {
     peer->connect(context);
@@ -102,8 +99,8 @@ Measurement bareRow(const Place& place, const std::string& question, const std::
   row.mode = Mode::block;
   row.bytes = kInt32;
   row.run = [=, between = place.between](const Stage& stage) {
-    const auto frameBytes = kFrameHead + kFrameItem * static_cast<std::size_t>(messages);
-    const std::shared_ptr<Peer> peer = makeBarePeer(between, frameBytes);
+    const std::shared_ptr<Peer> peer =
+        makeBarePeer(between, bareFrameBytes(static_cast<std::size_t>(messages)));
     return goThereAndBack(stage, peer, {1, messages}, Meter::kNobody);
   };
   return row;

@@ -7,6 +7,8 @@
 #include <signal.h>
 #include <sys/socket.h>
 
+#include <utility>
+
 #include "base/system_call.h"
 
 namespace mpf::bench {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The two ends of a TCP connection between the sides of a row, with TCP_NODELAY.
 //
-// All functions throw std::system_error.
+// Each connection makes the process ignore SIGPIPE.
+//   throws  std::system_error
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 
 #include <mpf/file_descriptor.h>

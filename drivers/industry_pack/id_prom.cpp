@@ -52,7 +52,7 @@ class Reader {
   Registers& space_;
 };
 
-bool hasValidCrcOfOne(Reader& reader, std::size_t bytesUsed) {
+bool hasValidCrcOfFormatOne(Reader& reader, std::size_t bytesUsed) {
   if (bytesUsed <= kCrcOfOne || bytesUsed > reader.words()) return false;
   std::vector<std::uint8_t> bytes;
   bytes.reserve(bytesUsed);
@@ -60,7 +60,7 @@ bool hasValidCrcOfOne(Reader& reader, std::size_t bytesUsed) {
   return crcOfFormatOne(bytes) == bytes[kCrcOfOne];
 }
 
-bool hasValidCrcOfTwo(Reader& reader, std::size_t bytesUsed) {
+bool hasValidCrcOfFormatTwo(Reader& reader, std::size_t bytesUsed) {
   const auto crc = reader.word(kCrcOfTwo);
   if (crc == 0) return true;
   if (bytesUsed / 2 <= kCrcOfTwo || bytesUsed / 2 > reader.words()) return false;
@@ -81,7 +81,7 @@ std::optional<IdProm> tryFormatOne(Reader& reader) {
   prom.revision = reader.byte(6);
   prom.driverId = reader.byte(8) | static_cast<std::uint32_t>(reader.byte(9)) << 8;
   prom.bytesUsed = reader.byte(10);
-  prom.hasValidCrc = hasValidCrcOfOne(reader, prom.bytesUsed);
+  prom.hasValidCrc = hasValidCrcOfFormatOne(reader, prom.bytesUsed);
   return prom;
 }
 
@@ -99,7 +99,7 @@ std::optional<IdProm> tryFormatTwo(Reader& reader) {
   prom.flags = reader.word(10);
   prom.runsAt32MHz = (prom.flags & 4) != 0;
   prom.bytesUsed = reader.word(11);
-  prom.hasValidCrc = hasValidCrcOfTwo(reader, prom.bytesUsed);
+  prom.hasValidCrc = hasValidCrcOfFormatTwo(reader, prom.bytesUsed);
   return prom;
 }
 

@@ -24,11 +24,11 @@ constexpr int kPausesToCalm = 2;         // after them a line that was enabled a
 }  // namespace
 
 InterruptThread::InterruptThread(Interrupt& interrupt, InterruptThreadOptions options,
-                                 Handler handler, FaultHandler fault)
+                                 Handler handler, FaultHandler onFault)
     : interrupt_(interrupt),
       options_(options),
       handler_(std::move(handler)),
-      fault_(std::move(fault)),
+      onFault_(std::move(onFault)),
       wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd",
                         "for an interrupt thread")),
       isPolled_(interrupt_.isPolled()) {  // a carrier that polls from the start reports that itself
@@ -129,7 +129,7 @@ void InterruptThread::followPolling() {
 }
 
 void InterruptThread::report(InterruptFault fault) const {
-  if (fault_) fault_(fault);
+  if (onFault_) onFault_(fault);
 }
 
 void InterruptThread::wait() const {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +14,7 @@
 #include "benchmarks/remote/routers.h"
 #include "benchmarks/remote/surroundings.h"
 #include "benchmarks/remote/tcp_peer.h"
+#include "benchmarks/stage/shared_object.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/watchdog.h"
 
@@ -32,10 +35,15 @@ ino_t netOf(const std::string& process) {
 
 // Sends requests and receives their replies, `window` of them at a time. Returns what went wrong.
 std::string exchange(const std::shared_ptr<Peer>& peer, int window) {
+  const SharedObject<std::atomic<bool>> hasServed;
   Workload workload;
   workload.stopsByItself = true;
+  workload.stopGrace = std::chrono::minutes(1);
   workload.scratchBytes = kBareScratchBytes;
-  workload.server = [peer](const RunContext& context) { peer->serve(context); };
+  workload.server = [&](const RunContext& context) {
+    peer->serve(context);
+    *hasServed = true;
+  };
   workload.requester = [&](const RunContext& context) {
     peer->connect(context);
     for (int round = 0; round < 3; ++round) {
@@ -44,9 +52,10 @@ std::string exchange(const std::shared_ptr<Peer>& peer, int window) {
     }
     context.stop();
     peer->roundTrip();
+    if (::waitpid(-1, nullptr, WNOHANG) != -1) throw std::runtime_error("a process is left");
   };
-
-  return stageOnTwo().run(workload).error;
+  const auto error = stageOnTwo().run(workload).error;
+  return error.empty() && !*hasServed ? "the server did not end by itself" : error;
 }
 
 void expectToEcho(const Surroundings& between, std::size_t unitBytes, int window) {
@@ -64,7 +73,7 @@ TEST(TcpPeer, EchoesMoreThanTheBuffersHold) {
   expectToEcho(Surroundings::loopback(), 1u << 20, 40);
 }
 
-TEST(BarePeer, CarriesFrames) {
+TEST(BarePeer, BringsFramesBack) {
   EXPECT_EQ(exchange(makeBarePeer(Surroundings::loopback(), 128), 1), "");
   EXPECT_EQ(exchange(makeBarePeer(Surroundings::loopback(), 1u << 20), 1), "");
 }

@@ -11,6 +11,7 @@
 
 #include <mpf/message_of.h>
 
+#include "benchmarks/remote/bare_peer.h"
 #include "schema/conversion.h"
 #include "schema/router.capnp.h"
 #include "tests/router/frames.h"
@@ -212,6 +213,18 @@ TEST(PlainItem, CarriesOnlyMessagesOfFixedSize) {
 PlainItem int32Item(std::uint32_t id) {
   return {.isRequest = true, .client = 1, .requestId = id, .message = Int32Message({.value = 1})};
 }
+// `mpf bench remote` compares with frames of this length.
+TEST(PlainRun, HasTheLengthOfABareFrame) {
+  std::vector<PlainItem> items;
+  for (const std::size_t count : {1u, 100u}) {
+    while (items.size() < count) items.push_back(int32Item(1));
+
+    const auto words = 1 + runOf(items).size();  // with the segment table
+
+    EXPECT_EQ(words * sizeof(capnp::word), bench::bareFrameBytes(count));
+  }
+}
+
 // How many of the items are read together.
 std::size_t runLength(std::vector<PlainItem> items) {
   const auto segment = runOf(items);

@@ -62,7 +62,7 @@ class InterruptThread {
   // Starts the thread and enables the interrupt. `interrupt` must outlive this object.
   //   throws  std::system_error when the thread or its descriptor cannot be created
   InterruptThread(Interrupt& interrupt, InterruptThreadOptions options, Handler handler,
-                  FaultHandler fault = {});
+                  FaultHandler onFault = {});
   // Disables the interrupt; the handler does not run after return.
   ~InterruptThread();
   InterruptThread(const InterruptThread&) = delete;
@@ -99,7 +99,7 @@ class InterruptThread {
   Interrupt& interrupt_;
   InterruptThreadOptions options_;
   Handler handler_;
-  FaultHandler fault_;
+  FaultHandler onFault_;
   FileDescriptor wakeUp_;
   // spurious interrupts less compensation; this and below: used by the thread only
   int spuriousExcess_ = 0;
