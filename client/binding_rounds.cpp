@@ -19,7 +19,8 @@ void BindingRounds::add(Place&& place) {
   isComplete_ = wasComplete;
 }
 
-// Moved first: a callback may own a client, whose end calls remove().
+// Moves the bindings out of removed_ first: destroying a callback may destroy a client, which calls
+// remove().
 void BindingRounds::dropRemoved() noexcept { const auto dropped = std::exchange(removed_, {}); }
 
 void BindingRounds::remove(const Binding& binding) noexcept {

@@ -26,8 +26,7 @@ class BindingTimer {
     auto due = dueNs_.load(std::memory_order_relaxed);
     while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_relaxed)) {
     }
-    // PAIR(due): dueNs_ of this binding is stored before that of the dispatcher is read, and before
-    // it is read whether the dispatcher has been told.
+    // PAIR(due): dueNs_ is stored before isReported_ and the dispatcher's dueNs_ are read.
     doorbell::fence();
     if (ns < due && !isReported_.exchange(true, std::memory_order_relaxed)) {
       dispatcher_.reportLowered(owner_);

@@ -38,7 +38,7 @@ std::string timeText(std::int64_t agoNs) {
 
 void Connector::setServer(const std::string& server, std::int32_t location) {
   SegmentName::checkServer(server);
-  auto reason = fmt::format("server \"{}\" at location {} is not there yet", server, location);
+  auto reason = fmt::format("server \"{}\" at location {} is not running", server, location);
   const std::lock_guard lock(mutex_);
   if (!server_.empty())
     throw std::logic_error(
@@ -181,7 +181,7 @@ std::string Connector::notAcceptedBecause(const PeerWindow& server) const {
 
 // Publishes the name of the missing server, for tools, and watches for new servers.
 void Connector::publishPendingBind() {
-  setReason(fmt::format("server \"{}\" at location {} is not there", server_, location_));
+  setReason(fmt::format("server \"{}\" at location {} is not running", server_, location_));
   parts_.names.start();
   if (pendingBind_) return;
   auto& endpoint = parts_.endpoint;

@@ -80,7 +80,7 @@ bool Dispatcher::Impl::takeStop() noexcept {
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
   const auto guard = becomeRunner();
   if (takeStop()) return false;
-  // First without the preparation to wait: often there is a message already.
+  // Tries one step before preparing to wait, because often a message has already arrived.
   return step() || run(deadline, [this] { return takeStop(); });
 }
 
@@ -104,7 +104,8 @@ template <class IsOver>
     // Checked even when every step finds work: a busy dispatcher must stop, too.
     if (isOver()) return false;
     if (step()) return true;
-    // The step takes the local event, and with it that of an interrupt() since the check above.
+    // step() also took the event of any interrupt() since the check above, so check again before
+    // waiting.
     if (isOver()) return false;
     dropKnocks();
     const bool hasWoken = endpoint().wait(std::min(deadline, nextDue()));

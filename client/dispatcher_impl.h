@@ -26,8 +26,8 @@ class Dispatcher::Impl {
   void endThread();
 
   // --- any thread, as long as no other thread runs the dispatcher ---
-  // Makes the calling thread the runner until the guard ends. A thread that already is the runner
-  // stays it after that.
+  // Makes the calling thread the runner until the guard ends. A thread that is already the runner
+  // remains the runner.
   //   throws  std::logic_error when another thread runs the dispatcher
   [[nodiscard, gnu::always_inline]] RunnerGuard becomeRunner() {
     endpoint().forkGuard().check("Dispatcher");

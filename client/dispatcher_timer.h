@@ -85,7 +85,7 @@ class DispatcherTimer {
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::atomic<std::uint64_t> waitingThread_{
       0};  // threadNumber() of the one that waits, or waited last
-  std::mutex mutex_;  // for the rest
+  std::mutex mutex_;  // guards the members below
   std::vector<Binding*> lowered_;
   bool hasLost_ = false;
 };

@@ -39,7 +39,8 @@ MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callba
 MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
     : dispatcher_(dispatcher.impl_),
       binding_(std::make_shared<Binding>(dispatcher_->parts(), std::move(callback))) {
-  // The command may run later on another thread, which could report a shortage of memory to nobody.
+  // Allocated here, because the command may run on another thread, where no caller can handle
+  // std::bad_alloc.
   const auto place = std::make_shared<BindingRounds::Place>(binding_);
   dispatcher_->commands().runOrPost(
       [dispatcher = dispatcher_.get(), place] { dispatcher->bindings().add(std::move(*place)); });

@@ -32,7 +32,8 @@ std::int64_t nsOf(Deadline takeBefore) noexcept {
   return takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1);
 }
 
-// What is done after each message of a run.
+// Returns the function that Link::trySendRun() calls after each message: it publishes the number of
+// messages sent.
 auto noteSent(Link& link) noexcept {
   return [&clientSent = link.control().clientSent](std::uint64_t messages) {
     clientSent.store(messages, std::memory_order_relaxed);
@@ -48,12 +49,12 @@ std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
 }  // namespace
 
 // Lets more requests be outstanding, once, and returns `sent`; or counts and returns a refusal.
-SendResult RequestSender::tryAllowMore() noexcept {
+SendResult RequestSender::tryGrow() noexcept {
   auto& link = channel_->link();
   const auto most = link.header().maxOutstanding;
   if (requests_->maxOutstanding() < most) {
     // The link gets memory for the replies to as many requests as the server permits.
-    if (link.tryAllowMore() && requests_->tryAllow(most)) return SendResult::sent;
+    if (link.tryAllowMore() && requests_->tryGrow(most)) return SendResult::sent;
     count(link.control().clientRefused);
     return SendResult::noMemory;
   }
@@ -69,12 +70,12 @@ SendResult RequestSender::tryAllowMore() noexcept {
   if (state_.load(std::memory_order_relaxed) != BindingState::connected)
     return SendResult::notConnected;
   auto& link = channel_->link();
-  // First: values that were computed before a call would have to be saved on the stack.
+  // Called first, so that no computed value must be saved on the stack during the call.
   const auto sentNs = link.timeOfNext();
   auto id = requestId;
   Request* request = nullptr;
   while ((request = requests_->tryReserve(id)) == nullptr) {
-    if (const auto refusal = tryAllowMore(); refusal != SendResult::sent) return refusal;
+    if (const auto refusal = tryGrow(); refusal != SendResult::sent) return refusal;
   }
   request->clientType = message.getClientType();
   request->clientExtra = message.getClientExtra();

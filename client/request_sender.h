@@ -105,7 +105,7 @@ class RequestSender {
                             std::span<std::uint32_t> requestIds) noexcept;
   SendResult sendWithCopy(Message& message, std::int64_t deadlineNs,
                           std::uint32_t* requestId) noexcept;
-  SendResult tryAllowMore() noexcept;
+  SendResult tryGrow() noexcept;
   SendResult takeBack(Request& request, SendResult result, std::unique_ptr<Message>* copy) noexcept;
   void setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept;
   SendResult refuseBehindUntaken() noexcept;

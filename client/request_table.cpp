@@ -13,7 +13,7 @@ RequestTable::RequestTable(std::uint32_t maxOutstanding, std::uint32_t lastId)
   first_ = receiver_ = sender_ = {firstEntries_.get(), size - 1};
 }
 
-bool RequestTable::tryAllow(std::uint32_t maxOutstanding) noexcept {
+bool RequestTable::tryGrow(std::uint32_t maxOutstanding) noexcept {
   if (maxOutstanding <= max_) return true;
   if (secondEntries_) return false;
   const auto size = std::bit_ceil(maxOutstanding);
@@ -27,8 +27,8 @@ bool RequestTable::tryAllow(std::uint32_t maxOutstanding) noexcept {
   return true;
 }
 
-// Whether a request in the first table has the place that `id` would have in the second one. Sees
-// every now and then whether the first table is empty.
+// Whether a request in the first table has the place that `id` would have in the second one. Once
+// in as many ids as the first table has entries, it checks whether that table is empty.
 bool RequestTable::hasPlaceInFirst(std::uint32_t id) noexcept {
   if ((id & first_.mask) == 0) {
     hasInFirst_ = false;

@@ -7,7 +7,7 @@
 // have few requests at a time. When it grows, the entries in use stay where they are until they
 // end.
 //
-// Threads  tryAllow(), tryReserve(), add() and takeBack(): one thread at a time, under the client's
+// Threads  tryGrow(), tryReserve(), add() and takeBack(): one thread at a time, under the client's
 //          lock. The rest: the dispatcher's thread, which holds this lock, too, if an entry may be
 //          taken back meanwhile.
 #pragma once
@@ -34,7 +34,7 @@ struct Request {
 
 class RequestTable {
  public:
-  //   maxOutstanding   of now; tryAllow() raises it
+  //   maxOutstanding   of now; tryGrow() raises it
   //   lastId           of the previous connection's table: a late cancel() must not match a new
   //                    request
   explicit RequestTable(std::uint32_t maxOutstanding, std::uint32_t lastId = 0);
@@ -46,7 +46,7 @@ class RequestTable {
     return added_.load(std::memory_order_relaxed) - ended_.load(std::memory_order_relaxed);
   }
   // Lets more requests be outstanding, once. Returns false if there is no memory.
-  [[nodiscard]] bool tryAllow(std::uint32_t maxOutstanding) noexcept;
+  [[nodiscard]] bool tryGrow(std::uint32_t maxOutstanding) noexcept;
 
   // How many more may be outstanding. tryReserve() then finds a place for each, with a new id.
   [[nodiscard]] std::uint32_t room() const noexcept { return max_ - outstanding(); }

@@ -61,7 +61,8 @@ void asOption(const std::string& option, Function function) try {
   throw CLI::ValidationError(option, error.what());
 }
 
-// Adds an option of which each value becomes an entry of the configuration and its place.
+// Adds an option. Each of its values becomes an entry of the configuration, and its place is
+// recorded.
 template <class Value, class Parse>
 CLI::Option* addEntries(CLI::App& app, const std::string& option, const std::string& type,
                         std::vector<Value>& values, std::vector<Places>& places, Parse parse,

@@ -82,7 +82,7 @@ MPF_KEEPS_KJ_LOG int run(const RouterArguments& arguments) {
   auto& port = io.unixEventPort;
   Router router(io, arguments.config(), *log);
   auto stopSignal = port.onSignal(SIGTERM).exclusiveJoin(port.onSignal(SIGINT)).ignoreResult();
-  // The signals also end the start-up. SIGHUP is ignored from here on.
+  // SIGTERM and SIGINT also end the start-up. After this wait, SIGHUP is ignored.
   serve(port, router, arguments, log).exclusiveJoin(kj::mv(stopSignal)).wait(io.waitScope);
   ServiceManager::notifyStopping();
   log->info("stopping");

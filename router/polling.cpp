@@ -29,7 +29,8 @@ void Polling::noteTraffic() {
 
 void Polling::add(Polled& window) {
   noteTraffic();
-  // After the last look at a window it wakes the event loop.
+  // A window that is not added wakes the event loop by its descriptor. While add() drops the oldest
+  // window, that window's last poll() may call add().
   if (!isPolling_ || isReplacing_) return;
   if (!windows_.empty() && windows_.back() == &window) return;
   if (const auto found = std::ranges::find(windows_, &window); found != windows_.end()) {
@@ -95,7 +96,7 @@ void Polling::pollWindows() {
 bool Polling::tryYield(std::int64_t nowNs) {
   ::sched_yield();
   const auto yieldNs = Clock::nowNs() - nowNs;
-  processor_.noteYield(yieldNs, true);  // the budget ends empty ones
+  processor_.noteYield(yieldNs, true);  // true: PollBudget ends polling that brings nothing
   return !SharedProcessor::isLong(yieldNs);
 }
 

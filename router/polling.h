@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Polling: keeps the event loop awake for a while after traffic, because a wake-up costs more than
-// the way of a message through the router.
+// Polling: keeps the event loop awake for a while after traffic, because a wake-up takes longer
+// than passing a message through the router.
 //
 //   asleep ─ noteTraffic() ─► polling ─ no traffic for PollBudget::ns() ─► asleep
 //
@@ -70,7 +70,7 @@ class Polling {
   bool isPolling_ = false;
   bool hasLooked_ = false;  // for answers, in this turn
   bool isCrowded_ = false;  // others use the processor for long: the next turn ends the polling
-  bool isReplacing_ = false;  // a window has its last look
+  bool isReplacing_ = false;  // add() is dropping the oldest window
   std::vector<Polled*> windows_;  // the one added last is at the end
   FatalTasks tasks_;
 };

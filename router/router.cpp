@@ -15,8 +15,8 @@ namespace {
 
 // The delay before pending binds are read: binds of many clients that start at once are read
 // together.
-constexpr auto kPendingBindsAfter = std::chrono::milliseconds(5);
-constexpr auto kPendingBindsAgain = std::chrono::seconds(1);  // when not all could be read
+constexpr auto kPendingBindsDelay = std::chrono::milliseconds(5);
+constexpr auto kPendingBindsRetryDelay = std::chrono::seconds(1);  // when not all could be read
 
 }  // namespace
 
@@ -36,7 +36,7 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& lo
                .polling = &polling_},
       monitors_(context_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
       pendingBinds_(context_.backplane),
-      bell_(io.unixEventPort, [this] { lookAtPendingBinds(); }),
+      bell_(io.unixEventPort, [this] { readPendingBindsSoon(); }),
       pendingBindsDue_(context_.timer, [this] { readPendingBinds(); }),
       refusedPeers_(context_.timer),
       tasks_(*this) {
@@ -56,7 +56,7 @@ kj::Promise<void> Router::start() {
   for (const auto& each : context_.config.listen) starts.add(listen(each).start());
   for (const auto& remote : context_.config.remotes)
     remotes_.push_back(std::make_unique<ClientRouter>(context_, remote));
-  lookAtPendingBinds();
+  readPendingBindsSoon();
   return kj::joinPromises(starts.releaseAsArray());
 }
 
@@ -70,7 +70,7 @@ Listener& Router::listen(const Listen& listen) {
 
 // Removes a listener that cannot listen; the next reload tries it again. A reload may have removed
 // it before its result arrives.
-void Router::listenLate(const Listen& listen) {
+void Router::listenAfterReload(const Listen& listen) {
   auto started = this->listen(listen).start();
   tasks_.add(started.catch_([this, late = std::weak_ptr(listeners_.back())](kj::Exception&& error) {
     const auto listener = late.lock();
@@ -107,7 +107,7 @@ void Router::onCaller(const Listen& listen, Listener::Caller caller) {
 }
 
 // Closes a connection whose peer has not sent its greeting: the oldest one of the host with the
-// most of them. It stays in the list until the event loop has closed it, but counts only once.
+// most of them. It stays in the list until the event loop has closed it, but is not chosen again.
 bool Router::tryMakeRoom() {
   const auto isIdle = [](const Session& session) {
     return session.end && !session.router->hasGreeted();
@@ -134,7 +134,7 @@ void Router::lookAtServers() {
   for (const auto& session : sessions_) session.router->lookAtServers();
 }
 
-void Router::lookAtPendingBinds() { pendingBindsDue_.setAt(Deadline::after(kPendingBindsAfter)); }
+void Router::readPendingBindsSoon() { pendingBindsDue_.setAt(Deadline::after(kPendingBindsDelay)); }
 
 void Router::readPendingBinds() {
   std::string problem;
@@ -149,7 +149,7 @@ void Router::readPendingBinds() {
     if (pendingBindProblem_.empty())
       context_.log.warn("cannot read all pending binds of clients of this host, trying again: {}",
                         problem);
-    pendingBindsDue_.setAt(Deadline::after(kPendingBindsAgain));
+    pendingBindsDue_.setAt(Deadline::after(kPendingBindsRetryDelay));
   }
   pendingBindProblem_ = std::move(problem);
 }
@@ -174,7 +174,7 @@ void Router::reload(const RouterConfig& config) {
     if (std::ranges::any_of(listeners_,
                             [&](const auto& listener) { return listener->listen() == each; }))
       continue;
-    listenLate(each);
+    listenAfterReload(each);
   }
   for (auto remote = remotes_.begin(); remote != remotes_.end();) {
     if (std::ranges::find(config.remotes, (*remote)->remote()) != config.remotes.end()) {
@@ -191,7 +191,7 @@ void Router::reload(const RouterConfig& config) {
       continue;
     remotes_.push_back(std::make_unique<ClientRouter>(context_, each));
   }
-  lookAtPendingBinds();
+  readPendingBindsSoon();
 }
 
 kj::Promise<void> Router::stop() {

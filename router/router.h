@@ -5,9 +5,9 @@
 //   pending binds here ─► ClientRouter ══ TCP ══ ServerRouter on another host
 //   servers here ◄── ServerRouter ══ TCP ══ ClientRouter on another host
 //
-// Read downwards: an object makes the parts below it, hands them what they use, and calls them. A
+// Calls go one way: an object makes its parts, hands them what they use, and calls them. A
 // part that has something to report has a struct Events of named functions; the object that makes
-// the part fills them in there (Line::Events, FarClient::Events). The way of a message:
+// the part fills them in there (Line::Events, FarClient::Events). The path of a message:
 //
 //   request  local client ─► RemoteServers::pump ─► Proxy::pump ─► Line::send ═► Line::handle ─►
 //            LocalServers::handle ─► FarClient::request ─► server
@@ -48,11 +48,11 @@ class Router final : private kj::TaskSet::ErrorHandler {
  private:
   void openTls(const RouterConfig& config);
   Listener& listen(const Listen& listen);
-  void listenLate(const Listen& listen);
+  void listenAfterReload(const Listen& listen);
   void onCaller(const Listen& listen, Listener::Caller caller);
   bool tryMakeRoom();
   void lookAtServers();
-  void lookAtPendingBinds();
+  void readPendingBindsSoon();
   void readPendingBinds();
   void taskFailed(kj::Exception&& error) override;
 

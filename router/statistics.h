@@ -49,7 +49,8 @@ class Statistics {
   Statistics(const Statistics&) = delete;
   Statistics& operator=(const Statistics&) = delete;
 
-  // Returns a row for as long as the pointer exists. All fields but the role are zero.
+  // Returns a row for as long as the pointer exists. All fields but role, state, sinceNs and isTls
+  // are zero.
   [[nodiscard]] std::shared_ptr<PeerRecord> add(layout::RouterRole role);
 
  private:

@@ -100,7 +100,7 @@ void Connections::close(Connection& connection) noexcept {
   endpoint_.peers().release(std::move(window));
 }
 
-void Connections::closeIfClientDid(Connection& connection) noexcept {
+void Connections::closeIfClientClosed(Connection& connection) noexcept {
   auto& link = connection.channel->link();
   if (link.peerState() == layout::LinkState::open || link.incoming().hasMessage()) return;
   if (link.isLost()) count(endpoint_.control().protocolErrors);
@@ -114,8 +114,8 @@ void Connections::closeDead() noexcept {
     MPF_STEP(client_died);
     removeFilesOf(link);
     MPF_STEP(client_removed);
-    // If the client closed the link before it died, closeIfClientDid() closes the connection after
-    // the requests that remain.
+    // If the client closed the link before it died, closeIfClientClosed() closes the connection
+    // after the requests that remain.
     if (link.peerState() == layout::LinkState::closed && link.incoming().hasMessage()) continue;
     count(endpoint_.control().peersDied);
     close(*connection);

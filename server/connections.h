@@ -44,7 +44,7 @@ class Connections {
   void open(Connection& connection);
   void close(Connection& connection) noexcept;
   // Closes a connection without a message, if its client has closed the link.
-  void closeIfClientDid(Connection& connection) noexcept;
+  void closeIfClientClosed(Connection& connection) noexcept;
   void closeDead() noexcept;
   // Closes all, and gives the clients a moment to receive the replies in the server's pools.
   void closeAll() noexcept;

@@ -28,9 +28,9 @@ using HandleRun = std::function<void(std::span<std::byte> values)>;
 
 class Handlers {
  public:
-  //   ofRun  for waiting requests of one client that are handled together; may be empty
-  void set(MessageType type, HandleMessage ofMessage, HandleRun ofRun = {}) {
-    auto made = std::make_unique<Handler>(std::move(ofMessage), std::move(ofRun));
+  //   forRun  for waiting requests of one client that are handled together; may be empty
+  void set(MessageType type, HandleMessage forMessage, HandleRun forRun = {}) {
+    auto made = std::make_unique<Handler>(std::move(forMessage), std::move(forRun));
     replaced_.reserve(replaced_.size() + 1);  // nothing fails after the exchange
     auto replaced = std::exchange(handlers_.at(static_cast<std::size_t>(type)), std::move(made));
     if (calls_ != 0) replaced_.push_back(std::move(replaced));
@@ -38,14 +38,14 @@ class Handlers {
 
   void clear() noexcept { handlers_ = {}; }
 
-  // Return nullptr if there is no handler for this number of a type.
+  // Return nullptr if there is no handler for this message type.
   [[nodiscard]] const HandleMessage* find(std::uint16_t type) const noexcept {
     const auto* const handler = handlerOf(type);
-    return handler != nullptr ? &handler->ofMessage : nullptr;
+    return handler != nullptr ? &handler->forMessage : nullptr;
   }
-  [[nodiscard]] const HandleRun* findOfRun(std::uint16_t type) const noexcept {
+  [[nodiscard]] const HandleRun* findForRun(std::uint16_t type) const noexcept {
     const auto* const handler = handlerOf(type);
-    return handler != nullptr && handler->ofRun ? &handler->ofRun : nullptr;
+    return handler != nullptr && handler->forRun ? &handler->forRun : nullptr;
   }
 
   // Exists while a handler is called. Calls may be nested.
@@ -64,8 +64,8 @@ class Handlers {
 
  private:
   struct Handler {
-    HandleMessage ofMessage;
-    HandleRun ofRun;
+    HandleMessage forMessage;
+    HandleRun forRun;
   };
 
   [[nodiscard]] const Handler* handlerOf(std::uint16_t type) const noexcept {

@@ -76,7 +76,7 @@ void MessageServer::setRunHandler(MessageType type, std::size_t size,
                                   std::span<std::byte> (*fields)(Message&),
                                   std::function<void(std::span<std::byte>)> handler) {
   const auto handle = std::make_shared<HandleRun>(std::move(handler));
-  auto ofMessage = [this, fields, handle](Message&& request) {
+  auto forMessage = [this, fields, handle](Message&& request) {
     const auto original = fields(request);
     if (original.empty()) return refuse(std::move(request));
     // A copy, as in a run: a body in shared memory may change.
@@ -87,9 +87,9 @@ void MessageServer::setRunHandler(MessageType type, std::size_t size,
     std::ranges::copy(value, original.begin());
     static_cast<void>(reply(std::move(request)));
   };
-  HandleRun ofRun;
-  if (size == layout::kFirstSlotBodyBytes) ofRun = [handle](auto values) { (*handle)(values); };
-  core_->handlers().set(type, std::move(ofMessage), std::move(ofRun));
+  HandleRun forRun;
+  if (size == layout::kFirstSlotBodyBytes) forRun = [handle](auto values) { (*handle)(values); };
+  core_->handlers().set(type, std::move(forMessage), std::move(forRun));
 }
 
 bool MessageServer::handleOne() {

@@ -38,7 +38,7 @@ class FanOutBodies final : public BodyLender, public std::enable_shared_from_thi
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
-  mutable std::mutex mutex_;  // for the rest
+  mutable std::mutex mutex_;  // guards the members below
   std::vector<std::shared_ptr<FanOutChunk>> lent_;
   std::shared_ptr<FanOutBodies> self_;  // set while lent_ is not empty
 };
@@ -78,7 +78,7 @@ class Publisher {
   bool stamps_;
   FanOutPool pool_;
   std::shared_ptr<FanOutBodies> bodies_ = std::make_shared<FanOutBodies>();
-  std::mutex mutex_;  // for the rest
+  std::mutex mutex_;  // guards the members below
   std::vector<std::weak_ptr<MessageLink>> borrowers_;  // links that have had a loan
 };
 

@@ -31,7 +31,7 @@ class ReplyCounts {
   void notSent() noexcept { control_.replyQueueFull.fetch_add(1, std::memory_order_relaxed); }
   // A request ended with the fate `refused`.
   void refused() noexcept { control_.refused.fetch_add(1, std::memory_order_relaxed); }
-  // The time from a request to its first reply.
+  // The time from taking a request to its first reply.
   void service(std::int64_t ns) noexcept { recordFromAnyThread(control_.serviceNs, ns); }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// replyResult(): what a program is told about a reply, from what the link did with it.
+// replyResult(): converts the result of a link into the ReplyResult of a program.
 #pragma once
 
 #include <mpf/message_server.h>

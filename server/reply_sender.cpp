@@ -12,7 +12,8 @@
 namespace mpf {
 namespace {
 
-// What is done after each message of a run.
+// Returns the function that Link::trySendRun() calls after each message: it publishes the number of
+// messages sent.
 auto noteSent(Link& link) noexcept {
   return [&serverSent = link.control().serverSent](std::uint64_t messages) {
     MPF_STEP(reply_sent);
@@ -209,7 +210,7 @@ void ReplySender::refuse(Connection& connection, std::uint32_t generation, const
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendLocked(Connection& connection,
                                                                   Message& message) noexcept {
   auto& link = connection.channel->link();
-  // First: values that were computed before a call would have to be saved on the stack.
+  // Called first, so that no computed value must be saved on the stack during the call.
   const auto sentNs = link.timeOfNext();
   const auto givenNs = message.getTimeStampNs();
   const auto timeNs = stamps_ && givenNs == 0 ? Clock::wallNs() : givenNs;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// RequestKeeper: refuses the requests of a server whose handles are destroyed without a reply.
+// RequestKeeper: refuses requests whose handles are destroyed without a reply.
 //
 // Handles of requests may outlive their server, so keepers are never freed: they cost a few bytes
 // for each server that the process creates. In the child of a fork, those of the parent do nothing.
@@ -31,7 +31,7 @@ class RequestKeeper final : public RouteKeeper {
   ForkGuard forkGuard_;
   std::mutex mutex_;
   ReplySender* replies_;  // nullptr after leave()
-  RequestKeeper* older_ = nullptr;  // the list of all, so that none counts as a leak
+  RequestKeeper* older_ = nullptr;  // links all keepers, so that leak checkers find them reachable
 };
 
 }  // namespace mpf

@@ -115,7 +115,7 @@ inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestI
 // Whether there is a request. If not, closes the connection if its client has closed the link.
 bool ServerCore::hasRequest(Connection& connection) noexcept {
   if (connection.channel->hasMessage()) return true;
-  connections_.closeIfClientDid(connection);
+  connections_.closeIfClientClosed(connection);
   return false;
 }
 
@@ -235,7 +235,7 @@ template <class TryHandle>
 [[gnu::always_inline]] inline bool ServerCore::tryHandleRun(Connection& connection) {
   auto& ring = connection.channel->link().incoming();
   const auto type = ring.nextType();  // read once: the client may change it
-  const auto* const handle = handlers_.findOfRun(type);
+  const auto* const handle = handlers_.findForRun(type);
   return handle != nullptr && ring.hasSecond() &&
          tryHandleRun(connection, static_cast<MessageType>(type), *handle);
 }

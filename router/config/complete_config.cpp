@@ -36,7 +36,7 @@ class Completion {
 
   void run() {
     checkRoot();
-    checkThatItHasATask();
+    checkHasTask();
     checkServe();
     checkListen();
     checkRemotes();
@@ -71,7 +71,7 @@ class Completion {
     }
   }
 
-  void checkThatItHasATask() const {
+  void checkHasTask() const {
     const auto serve = places_.entry("serve");
     const auto listen = places_.entry("listen");
     if (config_.serve.empty() && config_.listen.empty() && config_.remotes.empty()) {
@@ -138,7 +138,7 @@ class Completion {
         if (!seen.insert(location).second)
           refuse(places.of("locations"),
                  fmt::format("location {} appears twice in remotes; write it once", location));
-        checkThatItIsRemote(location, places);
+        checkNotServedHere(location, places);
       }
       if (isAny(remote.address.host)) {
         refuse(places.of("address"),
@@ -153,7 +153,7 @@ class Completion {
     }
   }
 
-  void checkThatItIsRemote(std::int32_t location, const Places& places) const {
+  void checkNotServedHere(std::int32_t location, const Places& places) const {
     for (std::size_t i = 0; i < config_.serve.size(); ++i) {
       const auto& serve = config_.serve[i];
       if (serve.location != location && serve.local != location) continue;

@@ -98,8 +98,9 @@ constexpr std::array<Limit, 10> kLimits{{
                                       Kind::size, 256, 64u << 20),
     numberLimit<&Limits::maxMessageBytes>(
         "max-message-size", "Largest message; larger ones are refused", Kind::size, 256, kGiB),
-    numberLimit<&Limits::windowBytes>("window-size", "Replies on their way to one client",
-                                      Kind::size, 4096, kGiB),
+    numberLimit<&Limits::windowBytes>(
+        "window-size", "Flow-control window: bytes of replies that one client has not taken yet",
+        Kind::size, 4096, kGiB),
     numberLimit<&Limits::maxClients>("max-clients", "Clients of one connection", Kind::count, 1,
                                      layout::kMaxLinks),
     numberLimit<&Limits::maxConnections>("max-connections", "Accepted connections", Kind::count, 1,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// LimitText: the limits of a router as text, by their names in files ("queue-size") and as options
+// The limits of a router as text, by their names in files ("queue-size") and as options
 // ("--queue-size"), with units.
 //
-// Threads  plain data.
+// Threads  any.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// readConfig(): reads a RouterConfig from a TOML file; this file names all keys.
+// readConfig(): reads a RouterConfig from a TOML file; the code below names all keys.
 #include <filesystem>
 #include <fmt/format.h>
 

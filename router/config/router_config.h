@@ -72,13 +72,14 @@ struct Limits {
   // Size up to which waiting messages share a frame (`bufSize` of the old MPF).
   std::uint32_t bufferBytes = 1u << 20;
   std::uint64_t maxMessageBytes = std::uint64_t{64} << 20;
-  // Replies on their way to one client that it has not received.
+  // Flow-control window: bytes of replies that one client has not taken yet.
   std::uint32_t windowBytes = std::uint32_t{4} << 20;
   std::uint32_t maxClients = 16000;  // per connection
   std::uint32_t maxConnections = 1000;  // accepted connections
   // A connection that shows no sign of life for this time is closed.
   std::chrono::milliseconds deadTime{2000};
-  // Longest time for the TLS handshake, and then for the peer's greeting.
+  // Longest time for the TLS handshake of an accepted connection, and then for the peer's greeting.
+  // An outgoing connection must finish TCP and TLS within deadTime.
   std::chrono::milliseconds handshakeTime{5000};
   // The pause before a reconnect: it begins with firstRetry, doubles up to lastRetry, and is
   // jittered.

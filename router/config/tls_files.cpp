@@ -76,8 +76,8 @@ Key keyIn(const PemFile& file, const std::string& text) {
   Key key(::PEM_read_bio_PrivateKey(reader(text).get(), nullptr, noPassword, &wasAsked));
   if (wasAsked)
     file.refuse(
-        "is protected by a password; store the key without one, readable for the router's user "
-        "alone");
+        "is protected by a password; store the key without a password, readable only by the "
+        "router's user");
   if (!key && text.find("PRIVATE KEY-----") != std::string::npos)
     file.refuse("is damaged: its private key cannot be read");
   if (!key) file.refuse("holds no private key in PEM form: no line -----BEGIN PRIVATE KEY-----");

@@ -28,7 +28,8 @@ std::int64_t FarClient::fullWindow() const noexcept {
 namespace {
 
 void checkId(std::uint32_t requestId) {
-  if (requestId == 0) throw ProtocolError(FarewellCode::PROTOCOL, "invalid requestId 0");
+  if (requestId == 0)
+    throw ProtocolError(FarewellCode::PROTOCOL, "received a request with the invalid requestId 0");
 }
 
 }  // namespace
@@ -154,12 +155,12 @@ void FarClient::useWindow(std::int64_t bytes) {
 // The last reply may exceed the window.
 std::size_t FarClient::room() const noexcept {
   if (window_ <= 0 || !dropped_.empty()) return 0;
-  const auto inWindow = static_cast<std::size_t>((window_ - 1) / kWindowBytesBeside + 1);
+  const auto inWindow = static_cast<std::size_t>((window_ - 1) / kWindowOverheadBytes + 1);
   return std::min(inWindow, shared_.line.room());
 }
 
 void FarClient::onRun(const MessageRun& run, bool isFirst) {
-  useWindow(static_cast<std::int64_t>(run.size() * kWindowBytesBeside));
+  useWindow(static_cast<std::int64_t>(run.size() * kWindowOverheadBytes));
   shared_.line.send(PlainItems{false, isFirst, terms_.number, run});
 }
 

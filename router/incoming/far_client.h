@@ -114,7 +114,7 @@ class FarClient final : private RunReceiver {
   const Shared& shared_;
   Terms terms_;
   State state_ = State::waiting;
-  bool queueFullSent_ = false;  // in this run of refused requests
+  bool queueFullSent_ = false;  // in this series of refused requests
   Fate fateAfterGiveUp_{};
   std::int64_t window_;  // bytes of replies that may be sent before the next credit
   std::string giveUpReason_;

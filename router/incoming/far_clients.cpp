@@ -32,8 +32,8 @@ void FarClients::open(std::uint32_t number) {
         FarewellCode::PROTOCOL,
         fmt::format("client number {} is not greater than the last one, {}", number, lastClient_));
   if (clients_.size() >= line_.limits().maxClients) {
-    throw ProtocolError(FarewellCode::LIMIT,
-                        fmt::format("more than {} clients", line_.limits().maxClients));
+    throw ProtocolError(FarewellCode::LIMIT, fmt::format("the peer opened more than {} clients",
+                                                         line_.limits().maxClients));
   }
   lastClient_ = number;
 }

@@ -18,8 +18,8 @@ namespace {
 constexpr std::size_t kMaxBindings = 4096;  // per connection
 constexpr std::chrono::seconds kLookEvery{1};
 
-[[noreturn]] void refuseServersItem() {
-  throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a server router sends");
+[[noreturn]] void rejectServerRouterItem() {
+  throw ProtocolError(FarewellCode::PROTOCOL, "received an item that only a server router sends");
 }
 
 bool isServerName(kj::StringPtr text) try {
@@ -69,20 +69,20 @@ void LocalServers::handle(wire::Item::Reader item) {
     case wire::Item::REPLY:
     case wire::Item::FATE:
     case wire::Item::QUEUE_FULL:
-      refuseServersItem();
+      rejectServerRouterItem();
     default:  // an item that only a newer peer defines
       return;
   }
 }
 
 void LocalServers::handle(PlainItem& item) {
-  if (!item.isRequest) refuseServersItem();
+  if (!item.isRequest) rejectServerRouterItem();
   if (auto* client = clients_.find(item.client)) client->request(item);
   else endWithoutClient(item.client, item.requestId);
 }
 
 void LocalServers::handle(const PlainItems& items) {
-  if (!items.isRequest) refuseServersItem();
+  if (!items.isRequest) rejectServerRouterItem();
   if (auto* client = clients_.find(items.client)) return client->request(items);
   for (std::size_t at = 0; at < items.run.size(); ++at)
     endWithoutClient(items.client, items.run[at].requestId());
@@ -181,7 +181,7 @@ void LocalServers::lookAtDoubtful() {
 
 void LocalServers::lookSoon() { looks_.setAt(Deadline::after(kLookEvery)); }
 
-// The server is gone. Its clients receive what it had sent, and are disconnected then.
+// The server is gone. Its clients receive what it had sent, and are then disconnected.
 void LocalServers::beginEnd(Binding& binding) {
   binding.state = Binding::State::ending;
   clients_.forEachOf(binding.number, [](FarClient& client) {
@@ -204,10 +204,10 @@ void LocalServers::sendThere(Binding& binding) {
   binding.state = Binding::State::there;
   binding.announced = binding.monitor->incarnation();
   const auto queueSize = binding.queueSize = binding.monitor->queueSize();
-  const auto maxBodyBytes = std::max(binding.monitor->maxMessageBytes(), kMostBesideElements);
+  const auto maxBodyBytes = std::max(binding.monitor->maxMessageBytes(), kMaxHeaderBytes);
   line_.send([number = binding.number, queueSize, incarnation = binding.announced,
-              maxMessageBytes = std::min(maxBodyBytes - kMostBesideElements,
-                                         line_.maxMessageBytes())](wire::Item::Builder item) {
+              maxMessageBytes = std::min(maxBodyBytes - kMaxHeaderBytes, line_.maxMessageBytes())](
+                 wire::Item::Builder item) {
     auto server = item.initServer();
     server.setBinding(number);
     server.setState(wire::Server::State::THERE);

@@ -23,7 +23,7 @@ ServerOptions optionsFor(const RouterContext& context, const ServerName& name,
   options.queueSize = std::max(static_cast<int>(offer.queueSize), 1);
   const auto maxOffered = std::min(offer.maxMessageBytes, maxMessageBytes);
   options.maxMessageBytes =
-      std::min(maxOffered + kMostBesideElements, std::max(maxMessageBytes, kMostBesideElements));
+      std::min(maxOffered + kMaxHeaderBytes, std::max(maxMessageBytes, kMaxHeaderBytes));
   options.waitMode = WaitMode::block;
   options.rights = context.config.rights;
   options.maxBorrowed = kMaxBorrowed;
@@ -218,14 +218,15 @@ Proxy::Client* Proxy::tryFind(std::uint32_t number) {
 bool Proxy::checkReply(const Client& client, std::uint32_t requestId, bool isFirst) const {
   const bool endsRequest = awaits(client, requestId);
   if (isFirst != endsRequest) {
-    throw ProtocolError(FarewellCode::PROTOCOL,
-                        fmt::format("a {} reply to request {} of client {}, which {}",
-                                    isFirst ? "first" : "later", requestId, client.number,
-                                    endsRequest ? "has had no first reply" : "is not pending"));
+    throw ProtocolError(
+        FarewellCode::PROTOCOL,
+        fmt::format("received a {} reply to request {} of client {}: the request {}",
+                    isFirst ? "first" : "further", requestId, client.number,
+                    endsRequest ? "has had no first reply" : "is not pending"));
   }
   if (client.window.isUsedUp())
     throw ProtocolError(FarewellCode::LIMIT,
-                        fmt::format("a reply to client {} beyond its window of {} bytes",
+                        fmt::format("received a reply to client {} beyond its window of {} bytes",
                                     client.number, client.window.bytes()));
   return endsRequest;
 }
@@ -245,7 +246,7 @@ void Proxy::reply(const PlainItems& items) {
   // If no reply is held, less than a quarter of the window is used, and a run fits into the rest.
   if (client->held.empty()) {
     sent = server_.replyTo(client->local, items.run, items.isFirst);
-    const auto bytes = static_cast<std::uint32_t>(sent * kWindowBytesBeside);
+    const auto bytes = static_cast<std::uint32_t>(sent * kWindowOverheadBytes);
     client->window.received(bytes);
     if (items.isFirst) ended(*client, static_cast<std::uint32_t>(sent));
     giveCredit(*client, bytes);
@@ -270,7 +271,7 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
       message->getType() == MessageType::requestFate) {
     if (error.fault != ConversionFault::unknownType && error.fault != ConversionFault::tooLarge) {
       throw ProtocolError(FarewellCode::PROTOCOL,
-                          message ? "a reply that only MPF itself may send" : error.text);
+                          message ? "received a reply that only MPF itself may send" : error.text);
     }
     return loseReply(number, reply, error.text);
   }
@@ -285,7 +286,7 @@ void Proxy::loseReply(std::uint32_t number, wire::Reply::Reader reply, const std
   if (reply.getIsFirst()) endRequest(number, reply.getRequestId(), Fate::outcomeUnknown, why);
   // At least as many bytes as the reply took from the window.
   giveCredit(clients_.at(number),
-             kWindowBytesBeside + reply.getMessage().totalSize().wordCount * sizeof(capnp::word));
+             kWindowOverheadBytes + reply.getMessage().totalSize().wordCount * sizeof(capnp::word));
 }
 
 void Proxy::endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate,

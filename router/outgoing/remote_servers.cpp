@@ -17,8 +17,8 @@ constexpr int kTurn = 16;  // requests of one server before those of the next se
 constexpr int kMaxTurns = 256;  // turns before the event loop runs its other tasks
 constexpr std::chrono::seconds kSweepEvery{1};  // while isPending() is true for a server
 
-[[noreturn]] void refuseClientsItem() {
-  throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a client router sends");
+[[noreturn]] void rejectClientRouterItem() {
+  throw ProtocolError(FarewellCode::PROTOCOL, "received an item that only a client router sends");
 }
 
 // A fate that only a newer peer defines becomes outcomeUnknown, which promises nothing.
@@ -258,7 +258,7 @@ void RemoteServers::handle(wire::Item::Reader item) {
     case wire::Item::CLOSE:
     case wire::Item::REQUEST:
     case wire::Item::CREDIT:
-      refuseClientsItem();
+      rejectClientRouterItem();
     default:  // an item that only a newer peer defines
       return;
   }
@@ -269,7 +269,7 @@ void RemoteServers::handle(const PlainItems& items) { handlePlain(items); }
 
 template <class Items>
 void RemoteServers::handlePlain(Items& items) {
-  if (items.isRequest) refuseClientsItem();
+  if (items.isRequest) rejectClientRouterItem();
   auto* proxy = connection_->openedProxyOf(items.client);
   if (proxy == nullptr) return;
   proxy->reply(items);

@@ -3,7 +3,7 @@
 //
 //   pending binds ─► bind ─► the peer reports "there" ─► Proxy ... "absent" ─► drained, destroyed
 //
-// It exists longer than a connection: connect() binds the servers over a new connection,
+// It outlives a connection: connect() binds the servers over a new connection,
 // disconnect() destroys their proxies. A server that no client has used or waited for during
 // kIdleProxyNs is unbound and forgotten.
 //

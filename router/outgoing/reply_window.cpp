@@ -10,7 +10,7 @@ std::uint32_t ReplyWindow::taken(std::uint64_t bytes) noexcept {
   constexpr std::uint32_t kCreditShare = 4;
   taken_ += static_cast<std::uint32_t>(bytes);
   if (taken_ < bytes_ / kCreditShare) return 0;
-  unpaid_ -= std::min<std::uint64_t>(taken_, unpaid_);
+  uncredited_ -= std::min<std::uint64_t>(taken_, uncredited_);
   return std::exchange(taken_, 0);
 }
 

@@ -25,14 +25,14 @@ struct Carried {
 
 // The bytes that a reply takes from its client's window (router.capnp, Credit): those of its
 // elements, and a fixed number for the rest.
-inline constexpr std::uint32_t kWindowBytesBeside = 64;
+inline constexpr std::uint32_t kWindowOverheadBytes = 64;
 [[nodiscard]] inline std::uint32_t windowBytesOf(const Message& reply) noexcept {
-  return kWindowBytesBeside + reply.arrayLength() * layoutOf(reply.getType()).elementBytes;
+  return kWindowOverheadBytes + reply.arrayLength() * layoutOf(reply.getType()).elementBytes;
 }
 
 // The largest size of a body without its elements. Limits on the wire count elements, those in
 // shared memory count whole bodies.
-inline constexpr std::uint64_t kMostBesideElements = [] {
+inline constexpr std::uint64_t kMaxHeaderBytes = [] {
   std::uint64_t most = 0;
   for (std::uint16_t type = 1; layoutOf(static_cast<MessageType>(type)).headerBytes != 0; ++type) {
     most = std::max<std::uint64_t>(most, layoutOf(static_cast<MessageType>(type)).headerBytes);

@@ -9,12 +9,12 @@ namespace mpf::router {
 namespace {
 
 constexpr std::size_t kWord = sizeof(capnp::word);
-constexpr std::size_t kFirstRoom = std::size_t{64} << 10;
-constexpr std::size_t kLeastRoom = std::size_t{4} << 10;
+constexpr std::size_t kInitialBytes = std::size_t{64} << 10;
+constexpr std::size_t kMinFreeBytes = std::size_t{4} << 10;
 // Room for the next part of a long frame.
-constexpr std::size_t kGoodRoom = std::size_t{16} << 10;
+constexpr std::size_t kMinFreeInFrameBytes = std::size_t{16} << 10;
 // A buffer that a long frame has made larger than this is freed afterwards.
-constexpr std::size_t kKeptRoom = std::size_t{4} << 20;
+constexpr std::size_t kMaxIdleBytes = std::size_t{4} << 20;
 
 std::uint32_t littleEndian32(const kj::byte* bytes) noexcept {
   return std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
@@ -30,7 +30,7 @@ capnp::ReaderOptions readerOptions(std::size_t bytes) {
 }  // namespace
 
 FrameReader::FrameReader(std::uint64_t maxFrameBytes)
-    : maxFrameBytes_(maxFrameBytes), buffer_(kj::heapArray<capnp::word>(kFirstRoom / kWord)) {}
+    : maxFrameBytes_(maxFrameBytes), buffer_(kj::heapArray<capnp::word>(kInitialBytes / kWord)) {}
 
 kj::ArrayPtr<kj::byte> FrameReader::room() {
   frame_.reset();
@@ -38,12 +38,12 @@ kj::ArrayPtr<kj::byte> FrameReader::room() {
   const auto needed = frameBytes();
   const auto capacity = buffer_.size() * kWord;
   if (needed && *needed > capacity - begin_) {
-    if (capacity - end_ < kGoodRoom)
+    if (capacity - end_ < kMinFreeInFrameBytes)
       makeRoom(static_cast<std::size_t>(
-          std::min<std::uint64_t>(*needed, std::max(2 * pending(), kFirstRoom))));
+          std::min<std::uint64_t>(*needed, std::max(2 * pending(), kInitialBytes))));
   } else if (!needed &&
-             (capacity - end_ < kLeastRoom || (pending() == 0 && capacity > kKeptRoom))) {
-    makeRoom(kFirstRoom);
+             (capacity - end_ < kMinFreeBytes || (pending() == 0 && capacity > kMaxIdleBytes))) {
+    makeRoom(kInitialBytes);
   }
   return buffer_.asBytes().slice(end_, buffer_.size() * kWord);
 }
@@ -51,9 +51,9 @@ kj::ArrayPtr<kj::byte> FrameReader::room() {
 // Moves the pending bytes to the beginning of a buffer that has at least `bytes` bytes and room for
 // more than the pending ones.
 void FrameReader::makeRoom(std::size_t bytes) {
-  const auto words = (std::max(bytes, pending() + kLeastRoom) + kWord - 1) / kWord;
+  const auto words = (std::max(bytes, pending() + kMinFreeBytes) + kWord - 1) / kWord;
   const auto used = pending();
-  if (words > buffer_.size() || buffer_.size() * kWord > kKeptRoom) {
+  if (words > buffer_.size() || buffer_.size() * kWord > kMaxIdleBytes) {
     auto larger = kj::heapArray<capnp::word>(words);
     std::memcpy(larger.asBytes().begin(), at(begin_), used);
     buffer_ = kj::mv(larger);
@@ -71,7 +71,7 @@ std::optional<std::uint64_t> FrameReader::frameBytes() const {
   if (segments > kMaxSegments) {
     throw ProtocolError(
         FarewellCode::PROTOCOL,
-        fmt::format("a frame of {} segments; the limit is {}", segments, kMaxSegments));
+        fmt::format("received a frame of {} segments; the limit is {}", segments, kMaxSegments));
   }
   const std::size_t table = (segments / 2 + 1) * kWord;
   if (pending() < table) return std::nullopt;
@@ -80,8 +80,9 @@ std::optional<std::uint64_t> FrameReader::frameBytes() const {
     bytes += std::uint64_t{littleEndian32(at(begin_ + 4 * (segment + 1)))} * kWord;
   }
   if (bytes > maxFrameBytes_) {
-    throw ProtocolError(FarewellCode::LIMIT,
-                        fmt::format("a frame of {} bytes; the limit is {}", bytes, maxFrameBytes_));
+    throw ProtocolError(
+        FarewellCode::LIMIT,
+        fmt::format("received a frame of {} bytes; the limit is {}", bytes, maxFrameBytes_));
   }
   return bytes;
 }

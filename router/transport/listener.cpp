@@ -135,7 +135,7 @@ kj::Promise<void> Listener::handshake(kj::AuthenticatedStream caller, const std:
         KJ_IF_MAYBE (byte, first.value)
           return openTls({kj::mv(first.stream), kj::mv(identity)}, *byte, address);
         return KJ_EXCEPTION(DISCONNECTED,
-                            "the caller closed the connection before it sent anything");
+                            "the peer closed the connection before it sent anything");
       });
 }
 
@@ -144,7 +144,7 @@ kj::Promise<void> Listener::openTls(kj::AuthenticatedStream caller, kj::byte fir
   if (first == kFrameByte) {
     refusedPeers_.add(kj::mv(caller.stream), FarewellCode::PROTOCOL, kExpectsTls);
     return KJ_EXCEPTION(FAILED,
-                        "the caller uses plain TCP, and this port expects TLS: set the same "
+                        "the peer uses plain TCP, and this port expects TLS: set the same "
                         "security at both routers");
   }
   return context_.tls->accept(kj::mv(caller)).then([this, address](kj::AuthenticatedStream peer) {

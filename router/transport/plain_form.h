@@ -46,7 +46,7 @@ static_assert(areRunsPlain(std::type_identity<MessageTypes>()));
 
 inline constexpr std::size_t kWordBytes = sizeof(capnp::word);
 
-// The pointer to a struct that begins `offset` words behind it.
+// The pointer to a struct that begins `offset` words after it.
 constexpr std::uint64_t structPointer(std::int64_t offset, std::size_t dataWords,
                                       std::size_t pointers) noexcept {
   return (static_cast<std::uint64_t>(offset) << 2 & UINT32_MAX) | std::uint64_t{dataWords} << 32 |
@@ -55,7 +55,7 @@ constexpr std::uint64_t structPointer(std::int64_t offset, std::size_t dataWords
 // The word in the byte order of the wire.
 [[nodiscard]] std::uint64_t toLittle(std::uint64_t value) noexcept;
 
-// One item, whose Request or Reply, Envelope and message lie one behind the other.
+// One item, whose Request or Reply, Envelope and message follow one another.
 struct PlainForm {
   static constexpr std::size_t kMostWords = 16;
   static constexpr std::size_t kMostFields = 6;

@@ -99,7 +99,7 @@ class PlainFrame {
 
 class PlainRun {
  public:
-  // A longer run becomes several frames.
+  // Upper bound of a frame: head and payload.
   static constexpr std::size_t kMaxBytes = std::size_t{32} << 10;
 
   PlainRun();

@@ -60,7 +60,7 @@ TEST_F(ConnectorTest, PublishesTheNameOfAMissingServer) {
 
   EXPECT_FALSE(connector_.tryFindServer());
 
-  EXPECT_EQ(connector_.notConnectedBecause(), "server \"dac\" at location 0 is not there");
+  EXPECT_EQ(connector_.notConnectedBecause(), "server \"dac\" at location 0 is not running");
   EXPECT_TRUE(hasPendingBind());
   connector_.cancelPendingBind();
   EXPECT_FALSE(hasPendingBind());

@@ -12,7 +12,7 @@ namespace {
 TEST_F(ClientTest, ConnectsWhicheverSideStartsFirst) {
   client_.bind("device[0]/a");
   EXPECT_EQ(client_.send(Int32Message()), SendResult::notConnected);
-  EXPECT_THAT(client_.notConnectedBecause(), testing::HasSubstr("not there"));
+  EXPECT_THAT(client_.notConnectedBecause(), testing::HasSubstr("not running"));
 
   startServer();
   runUntil([&] { return client_.isConnected(); });
@@ -87,7 +87,7 @@ TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   runUntil([&] { return client_.notConnectedBecause().find("not accepted") != std::string::npos; });
 
   server_.reset();
-  runUntil([&] { return client_.notConnectedBecause().find("not there") != std::string::npos; });
+  runUntil([&] { return client_.notConnectedBecause().find("not running") != std::string::npos; });
   serverRuns_ = true;
   startServer();
   runUntil([&] { return client_.isConnected(); });

@@ -84,7 +84,7 @@ TEST_F(RequestSenderTest, AConnectorWithoutServerPublishesAPendingBindUntilItIsC
   EXPECT_FALSE(connector_.tryFindServer());
 
   EXPECT_TRUE(parts_.names.isRunning());
-  EXPECT_EQ(connector_.notConnectedBecause(), "server \"dac\" at location 0 is not there");
+  EXPECT_EQ(connector_.notConnectedBecause(), "server \"dac\" at location 0 is not running");
   EXPECT_EQ(backplane_.segmentNames().size(), before + 1);
   connector_.cancelPendingBind();
   EXPECT_EQ(backplane_.segmentNames().size(), before);

@@ -120,7 +120,7 @@ class GrownTable : public testing::Test {
   GrownTable() {
     for (int i = 0; i < 4; ++i) early_.push_back(&addNew(table_));
     EXPECT_EQ(table_.tryReserve(none_), nullptr);
-    EXPECT_TRUE(table_.tryAllow(12));
+    EXPECT_TRUE(table_.tryGrow(12));
   }
   RequestTable table_{4};
   std::vector<Request*> early_;
@@ -188,7 +188,7 @@ TEST(RequestTable, GrowsWhileRequestsEnd) {
       std::uint32_t id = 0;
       auto* request = table.tryReserve(id);
       if (request == nullptr) {
-        if (sent > 20) isAllowed = table.tryAllow(64) && isAllowed;
+        if (sent > 20) isAllowed = table.tryGrow(64) && isAllowed;
         std::this_thread::yield();
         continue;
       }

@@ -26,7 +26,7 @@ TEST_F(DevMpfTest, AnAbsentServerIsACommAlarmWithTheReason) {
   EXPECT_EQ(Ioc::get("v.SEVR"), "INVALID");
   EXPECT_EQ(Ioc::get("v.STAT"), "COMM");
   EXPECT_EQ(Ioc::get("v.PACT"), "0");
-  EXPECT_EQ(Ioc::get("v.AMSG"), "server is not there");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "server is not running");
 }
 
 TEST_F(DevMpfTest, ARecordRecoversWhenItsServerStarts) {

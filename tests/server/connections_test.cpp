@@ -90,12 +90,12 @@ TEST_F(ConnectionsTest, AConnectionEndsAfterTheLastRequestOfAClientThatClosedIt)
   link.setState(layout::LinkState::closed);
   EXPECT_FALSE(Connections::isConnected(route));
 
-  connections_.closeIfClientDid(connection);
+  connections_.closeIfClientClosed(connection);
   ASSERT_TRUE(connection.channel) << "a request waits";
   auto& incoming = connection.channel->link().incoming();
   static_cast<void>(incoming.begin());
   incoming.end();
-  connections_.closeIfClientDid(connection);
+  connections_.closeIfClientClosed(connection);
 
   EXPECT_FALSE(connection.channel);
   EXPECT_EQ(valueOf(control().protocolErrors), 0u);

@@ -15,11 +15,11 @@ TEST(Handlers, AreFoundByTheNumberOfTheirType) {
   handlers.set(MessageType::float64, [](Message&&) {}, [](std::span<std::byte>) {});
 
   EXPECT_NE(handlers.find(kNumber), nullptr);
-  EXPECT_EQ(handlers.findOfRun(kNumber), nullptr);
-  EXPECT_NE(handlers.findOfRun(static_cast<std::uint16_t>(MessageType::float64)), nullptr);
+  EXPECT_EQ(handlers.findForRun(kNumber), nullptr);
+  EXPECT_NE(handlers.findForRun(static_cast<std::uint16_t>(MessageType::float64)), nullptr);
   EXPECT_EQ(handlers.find(static_cast<std::uint16_t>(MessageType::outOfBand)), nullptr);
   EXPECT_EQ(handlers.find(60000), nullptr);
-  EXPECT_EQ(handlers.findOfRun(60000), nullptr);
+  EXPECT_EQ(handlers.findForRun(60000), nullptr);
 }
 
 TEST(Handlers, ThatAreReplacedExistUntilTheOutermostCallReturns) {

@@ -221,7 +221,7 @@ TEST_F(PublisherTest, AClientThatLeavesWhileItReadsKeepsItsMessageUnchanged) {
   const auto chunk = borrow(reader.link);
 
   reader.link.setState(layout::LinkState::closed);
-  connections_.closeIfClientDid(reader.connection);
+  connections_.closeIfClientClosed(reader.connection);
   for (int i = 0; i < 20; ++i) filled(2);
 
   EXPECT_EQ(elementOf(chunk), 1.0);

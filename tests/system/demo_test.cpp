@@ -100,7 +100,7 @@ TEST_F(Demo, AnIocShowsADeadServerToItsClients) {
   EXPECT_THAT(demo.output, AllOf(HasSubstr("   lab:volts 2.50 V, severity 0\n"),
                                  HasSubstr(" 2.495117188\n"),  // lab:meter
                                  HasSubstr("   lab:volts 2.50 V, severity 3\n"),
-                                 HasSubstr("'server is not there'"),
+                                 HasSubstr("'server is not running'"),
                                  HasSubstr("   lab:volts -1.25 V, severity 0\n")));
 }
 

@@ -35,7 +35,7 @@ class StartOrderTest : public testing::Test {
 
 TEST_F(StartOrderTest, AClientMayStartBeforeItsServer) {
   auto client = startClient();
-  EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not there");
+  EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not running");
 
   auto server = startServer();
 
@@ -114,7 +114,7 @@ TEST_F(StartOrderTest, AClientFindsItsServerWithoutInotify) {
   if (::geteuid() != 0 || limit > kMostToTake)
     GTEST_SKIP() << "only root can use up the instances of a user without other programs";
   Victim client("crowd", backplane_.name(), {"1", "as", "65533", "65533", "without-inotify"});
-  EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not there");
+  EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not running");
 
   MessageServer server(backplane_, "echo", {.location = 0, .rights = {.mode = 0666}});
   server.on<Float64>([](Float64& request) { request.value += 1; });

@@ -87,7 +87,7 @@ TEST_F(EchoClientTest, SaysWhyAServerIsNotReached) {
 
   EXPECT_EQ(out_, "0 came back, 2 did not\n");
   EXPECT_THAT(errors_, HasSubstr("message 0: not sent: not connected: server \"nobody\" at "
-                                 "location 0 is not there\n"));
+                                 "location 0 is not running\n"));
 }
 
 TEST_F(EchoClientTest, ReportsManyFailuresInFewLines) {

@@ -84,8 +84,8 @@ TEST_F(TlsFilesTest, ErrorsNameTheFileAndTheReason) {
       {{certificate, damagedKey, authorities},
        "damaged.key is damaged: its private key cannot be read"},
       {{certificate, locked, authorities},
-       "locked.key is protected by a password; store the key without one, readable for the "
-       "router's user alone"},
+       "locked.key is protected by a password; store the key without a password, readable only by "
+       "the router's user"},
       {{certificate, ours_.files("ioc2").key, authorities},
        "ours-ioc20.key is not the key of the first certificate in ours-ioc10.pem"},
       {{certificate, key, key},

@@ -177,7 +177,7 @@ TEST_F(ListenerTest, SendsAFarewellToAPeerThatUsesPlainTcp) {
   ASSERT_TRUE(items[0].isFarewell());
   EXPECT_THAT(toStd(items[0].getFarewell().getReason()),
               HasSubstr("this port expects TLS: write security = \"tls\""));
-  EXPECT_THAT(said_, HasSubstr("the caller uses plain TCP, and this port expects TLS"));
+  EXPECT_THAT(said_, HasSubstr("the peer uses plain TCP, and this port expects TLS"));
   ::shutdown(caller.get(), SHUT_WR);
   runUntil([&] { return hasClosed(caller); });
 }

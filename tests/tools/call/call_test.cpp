@@ -195,7 +195,7 @@ TEST_F(CallTest, NamesAnAbsentServer) {
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_THAT(ended.err, ContainsRegex("^mpf call: not sent: not connected: server \"nobody\" at "
-                                       "location 0 is not there.*; `mpf ls` shows"));
+                                       "location 0 is not running.*; `mpf ls` shows"));
 }
 
 TEST_F(CallTest, TheServerMayStartWithinTheTimeout) {

@@ -71,7 +71,7 @@ TEST_F(ReportTest, ListsAClientThatWaitsForItsServer) {
   dispatcher_ = std::make_unique<Dispatcher>(backplane_);
   MessageClient client(*dispatcher_, [](const Message&) {});
   client.bind("later", 3);
-  while (client.notConnectedBecause().find("not there") == std::string::npos)
+  while (client.notConnectedBecause().find("not running") == std::string::npos)
     dispatcher_->runOnce(Deadline::after(100us));
   while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
 

@@ -59,7 +59,7 @@ TEST_F(TortureChecks, SegmentsOfLivingProcessesAreNotStale) {
   connect(client);
   MessageClient waiting(*dispatcher_, [](const Message&) {});
   waiting.bind("absent", 0);
-  while (waiting.notConnectedBecause().find("not there") == std::string::npos)
+  while (waiting.notConnectedBecause().find("not running") == std::string::npos)
     dispatcher_->runOnce(Deadline::after(100us));
   ASSERT_EQ(client.send(client.alloc<Float64Array>(100'000)), SendResult::sent);
 
