@@ -54,7 +54,7 @@ TEST_F(RouterStrangersTest, ACallerInPlainTcpIsToldThatThePortExpectsTls) {
   const auto near = call({"--plain"});
 
   near->waitUntilSaid("this port expects TLS: write security = \"tls\" for this remote");
-  far->waitUntilSaid("the caller uses plain TCP, and this port expects TLS");
+  far->waitUntilSaid("the peer uses plain TCP, and this port expects TLS");
 }
 
 TEST_F(RouterStrangersTest, ACallerWithTlsIsToldThatThePortIsPlain) {
