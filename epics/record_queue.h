@@ -18,7 +18,7 @@
 
 namespace mpf {
 
-// What a message does to the request that it belongs to.
+// Whether the message ends the request that it belongs to.
 [[nodiscard]] inline bool endsRequest(const Message& message) noexcept {
   return (message.route().flags & kEndsRequest) != 0;
 }

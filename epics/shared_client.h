@@ -88,7 +88,7 @@ class SharedClient {
   std::vector<Member*> members_;
   std::deque<Waiting> backlog_;
   bool isBound_ = false;
-  bool isConnected_ = false;  // what the members know
+  bool isConnected_ = false;  // as the members were last told
   std::atomic<bool> hasBacklog_{false};
 };
 

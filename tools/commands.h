@@ -15,7 +15,8 @@ namespace mpf::tools {
 // Does the work after parsing. Returns the exit status: 0 success, 1 failure, 2 usage error.
 using Run = std::function<int()>;
 
-void addCrate(CLI::App& app, Run& run);  // run, new, ps, logs, stop, start, restart, reload
+void addCrate(CLI::App& app,
+              Run& run);  // run, new, convert, ps, logs, capsule, stop, start, restart, reload
 void addLs(CLI::App& app, Run& run);
 void addMrr(CLI::App& app, Run& run);
 void addMsr(CLI::App& app, Run& run);

@@ -68,13 +68,14 @@ bool matches(const Tree& request, const Handling& handling) {
   return message->at("cmd") == handling.cmd;
 }
 
-// The request in work. Its window names type and cmd; the link of which it is the last request
-// that was taken names the rest. If several match, those without a reply are more probable.
-Tree handlingOf(const Handling& handling, std::int64_t atLeastNs,
+// The request that the server was handling. Its window names type and cmd; the link of which it is
+// the last request that was taken names the rest. If several match, those without a reply are more
+// probable.
+Tree handlingOf(const Handling& handling, std::int64_t atMostNs,
                 const std::vector<std::pair<Tree, Tree>>& taken) {
   Tree tree{{"type", toString(static_cast<MessageType>(handling.type))},
             {"cmd", handling.cmd},
-            {"forAtMostNs", atLeastNs}};
+            {"forAtMostNs", atMostNs}};
   auto candidates = Tree::array();
   for (const auto* const wanted : {"no", "unknown", "yes"}) {
     for (const auto& [link, request] : taken) {

@@ -110,9 +110,9 @@ Tree inChild(const std::function<Tree()>& work, std::chrono::milliseconds limit)
   const bool isInTime = tryReadAll(output.get(), Deadline::after(limit), text);
   ::kill(child, SIGKILL);
   retryInterrupted([&] { return ::waitpid(child, nullptr, 0); });
-  if (!isInTime) return problem(fmt::format("it was not read within {} ms", limit.count()));
+  if (!isInTime) return problem(fmt::format("the core was not read within {} ms", limit.count()));
   auto tree = Tree::parse(text, nullptr, false);
-  return tree.is_object() ? tree : problem("the process that read it died");
+  return tree.is_object() ? tree : problem("the process that read the core died");
 }
 
 }  // namespace

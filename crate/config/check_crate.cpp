@@ -42,7 +42,7 @@ class CrateCheck {
       checkServers(process);
       checkModules(process);
     }
-    checkCircles();
+    checkCycles();
   }
 
  private:
@@ -145,25 +145,25 @@ class CrateCheck {
     }
   }
 
-  void checkCircles() {
+  void checkCycles() {
     for (const auto& process : crate_.processes) {
       std::vector<std::string> path;
-      if (findCircle(process, path)) {
+      if (findCycle(process, path)) {
         errors_.add(process.placeOf("needs"),
-                    fmt::format("the needs form a circle: {}; remove one of them",
+                    fmt::format("the needs form a cycle: {}; remove one of them",
                                 fmt::join(path, " needs ")));
         return;
       }
     }
   }
   // Whether the needs of `process` lead back to the first process of `path`.
-  bool findCircle(const Process& process, std::vector<std::string>& path) {
+  bool findCycle(const Process& process, std::vector<std::string>& path) {
     path.push_back(process.name);
     if (path.size() > 1 && path.front() == process.name) return true;
     if (path.size() <= crate_.processes.size()) {
       for (const auto& need : process.needs) {
         const auto found = names_.find(need);
-        if (found != names_.end() && findCircle(*found->second, path)) return true;
+        if (found != names_.end() && findCycle(*found->second, path)) return true;
       }
     }
     path.pop_back();

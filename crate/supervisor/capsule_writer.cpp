@@ -45,7 +45,7 @@ std::string CapsuleWriter::collect(const Service& service, const ProcessEnd& end
   try {
     if (service.endReason() != EndReason::stopRequest) path = write(service, end);
   } catch (const std::exception& error) {
-    printError("mpf run: {}: no capsule: {}\n", service.plan().name, error.what());
+    printError("mpf run: {}: cannot write a capsule: {}\n", service.plan().name, error.what());
   }
   forget(service);
   return path;

@@ -47,7 +47,7 @@ std::string readLine(int socket, const Deadline& deadline) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
     pollfd poll{socket, POLLIN, 0};
     if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(left.count())); }) <= 0)
-      throw std::runtime_error("it does not reply");
+      throw std::runtime_error("the supervisor does not reply; try again, or see its log");
     const auto length =
         retryInterrupted([&] { return ::read(socket, bytes.data(), bytes.size()); });
     if (length <= 0) return text;

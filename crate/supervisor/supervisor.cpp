@@ -163,7 +163,7 @@ bool Supervisor::hasDependants(const Service& service) const {
   });
 }
 
-// Does what each service wants now.
+// Performs the action of each service.
 void Supervisor::act() {
   const auto now = Clock::nowNs();
   for (const auto& member : members_) {

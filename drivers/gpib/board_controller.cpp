@@ -55,7 +55,7 @@ Result failed(GpibResult&& problem) {
 GpibResult GpibBoardController::check(const GpibAddress& address) const {
   if (!address.isValid())
     return {GpibStatus::failure,
-            fmt::format("{} is no GPIB address: addresses are 0 to 30", toString(address))};
+            fmt::format("{} is not a GPIB address: use 0 to 30", toString(address))};
   if (address.primary == own_)
     return {GpibStatus::failure,
             fmt::format("address {} is that of the controller: give the instrument another one",

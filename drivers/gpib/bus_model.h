@@ -9,7 +9,7 @@
 //               ├─ DAV NRFD NDAC ┼─ instrument 5.1
 //               ...  wired-or  ...
 //
-// The bus needs no time and no thread: after each access by the controller, the handshake goes on
+// The bus needs no time and no thread: after each access by the controller, the handshake continues
 // until a participant waits. An instrument that had no byte, or did not take one, is asked again at
 // the next access and by proceed().
 //
@@ -66,8 +66,8 @@ class GpibBusModel {
     const std::lock_guard lock(mutex_);
     return act(lines_);
   }
-  // The same, then lets the handshake go on. For the other registers of a controller, and for what
-  // a test does to an instrument.
+  // The same, then lets the handshake continue. For the other registers of a controller, and for
+  // what a test does to an instrument.
   template <class Act>
   auto access(Act act) {
     const std::lock_guard lock(mutex_);

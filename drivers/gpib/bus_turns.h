@@ -2,7 +2,7 @@
 // BusTurns: the turns of callers on a GPIB bus: a queue, first come first served, and a lease.
 //
 //   take() ──► | waiting | waiting | ──► on the bus ──► give()
-//              while the bus is leased, only its holder goes on it; others keep their places
+//              while the bus is leased, only its holder gets a turn; others keep their places
 //
 //              lease()                             release()
 //   shared ───────────────────► leased by NAME ───────────────────────────► shared
@@ -27,7 +27,7 @@ namespace mpf {
 
 class BusTurns {
  public:
-  // A user that no lease holds up: the bus itself, which looks at the SRQ line.
+  // A user that no lease excludes: the bus itself, which looks at the SRQ line.
   static constexpr GpibUser kBusItself = ~GpibUser{0};
 
   // Waits until the bus is the caller's. After success, the caller must call give().

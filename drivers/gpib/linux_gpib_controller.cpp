@@ -150,7 +150,8 @@ GpibResult LinuxGpibController::resultOf(std::string_view what, int status) cons
           fmt::format("{}; check that the driver is loaded and this user may open it",
                       std::generic_category().message(static_cast<int>(library_.count()))));
     case LibGpib::Error::notController:
-      return failed(GpibStatus::failure, "the board is not in charge of the bus; send IFC");
+      return failed(GpibStatus::failure,
+                    "the board is not the controller in charge (CIC); send IFC");
     case LibGpib::Error::noListener:
       return failed(GpibStatus::noListener,
                     "no instrument accepted the bytes; check the address and that it is on");

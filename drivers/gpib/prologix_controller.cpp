@@ -134,7 +134,7 @@ GpibPollResult PrologixController::serialPoll(const GpibAddress& at, Deadline de
       answer.bytes.empty()
           ? fmt::format("{}: the instrument at address {} sent no status byte; check that it is on",
                         description(), toString(at))
-          : fmt::format("{} answers \"{}\" to ++spoll, which is no status byte", description(),
+          : fmt::format("{} answers \"{}\" to ++spoll, which is not a status byte", description(),
                         printable(textOf(answer.bytes)));
   return result;
 }

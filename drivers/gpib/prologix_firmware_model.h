@@ -6,7 +6,7 @@
 //                                              └─► instruments, by address
 //
 // It follows the manual of the GPIB-USB, which says that ++read <char> does not end with EOI. It
-// gives an instrument that accepts no byte up after ++read_tmo_ms; the manual does not say when.
+// gives up on an instrument that accepts no byte after ++read_tmo_ms; the manual names no time.
 //
 // Threads  one.
 // Source   Prologix GPIB-USB user manual 6.107.

@@ -179,7 +179,7 @@ GpibResult PrologixLink::explainMissingVersion(GpibStatus status) const {
                                 "controller, that no other program uses it, and that its bus is "
                                 "not stuck",
                                 description_)};
-  return {status, fmt::format("{} answers \"{}\" to ++ver, which is no version of a Prologix "
+  return {status, fmt::format("{} answers \"{}\" to ++ver, which is not the version of a Prologix "
                               "controller; check the address",
                               description_, printable(shown))};
 }

@@ -206,7 +206,7 @@ GpibResult UsbtmcController::failed(std::string_view what, std::int64_t result) 
 
 GpibResult UsbtmcController::unsupported(std::string_view what) const {
   return {GpibStatus::unsupported,
-          fmt::format("{}: {}: this instrument cannot do it over USB", description_, what)};
+          fmt::format("{}: {}: not supported by this instrument over USB", description_, what)};
 }
 
 }  // namespace mpf

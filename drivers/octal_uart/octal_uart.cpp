@@ -181,7 +181,7 @@ std::string OctalUart::textOf(int line, InterruptFault fault) const {
     case InterruptFault::polled:
       return fmt::format(
           "{} is polled by its carrier from now on, which is too slow for fast lines", which);
-    case InterruptFault::never:
+    case InterruptFault::dead:
       return fmt::format(
           "{} stays inactive although the chip has requests: it is polled every {} ms, which is "
           "too slow for fast lines",

@@ -200,7 +200,7 @@ void Ti9914Chip::report(InterruptFault fault) const {
                               "second at a time until it is released");
     case InterruptFault::polled:
       return options_.onAlarm(line + "is polled by its carrier from now on: transfers are slower");
-    case InterruptFault::never:
+    case InterruptFault::dead:
       return options_.onAlarm(line +
                               "stays inactive although the chip has requests: the chip is polled, "
                               "and transfers are slower");

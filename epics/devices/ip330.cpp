@@ -26,7 +26,8 @@ class DevAiIp330Scan final : public DevMpf {
       : DevMpf(reinterpret_cast<dbCommon*>(record), &record->inp) {
     const std::string_view text = getUserParm();
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), gain_);
-    if (!text.empty() && (error != std::errc{} || gain_ < 0 || gain_ > 3)) {
+    if (!text.empty() &&
+        (error != std::errc{} || end != text.data() + text.size() || gain_ < 0 || gain_ > 3)) {
       errlogPrintf("%s: INP: gain \"%s\": use 0, 1, 2 or 3\n", record->name, getUserParm());
       setStatus(S_db_badField);
       record->pact = TRUE;  // the record never processes

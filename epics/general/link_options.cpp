@@ -143,8 +143,9 @@ const Key& keyNamed(std::string_view name, bool isOutput) {
   std::vector<std::string_view> names;
   for (const auto& key : kKeys)
     if (isValid(key)) names.push_back(key.name);
-  throw std::invalid_argument(fmt::format("invalid key \"{}\": an {} record has {}", name,
-                                          isOutput ? "output" : "input", fmt::join(names, ", ")));
+  throw std::invalid_argument(fmt::format("invalid key \"{}\": the keys of an {} record are {}",
+                                          name, isOutput ? "output" : "input",
+                                          fmt::join(names, ", ")));
 }
 
 }  // namespace

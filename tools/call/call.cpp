@@ -244,7 +244,7 @@ void addCall(CLI::App& app, Run& run) {
   addSeconds(command, "--follow", arguments->follow,
              "Time to print further messages that the server sends after the reply", true);
   command.add_flag("--print", arguments->printAll,
-                   "Print each reply of a loop, and arrays in full");
+                   "With --count: print each reply; print arrays in full");
   addJson(command, arguments->json);
   command.footer(
       "Fields that are not named are 0. The message about an unknown field lists all fields.\n"

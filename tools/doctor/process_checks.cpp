@@ -12,11 +12,11 @@ namespace {
 
 // A warning when `value` is below `enough`; `purpose` says what the limit is needed for.
 Finding checkAtLeast(const char* name, std::optional<std::uint64_t> value, std::uint64_t enough,
-                     const std::string& purpose, const std::string& remedy) {
+                     const std::string& purpose, const std::string& remedy, const char* unit = "") {
   if (!value) return {name, Health::unknown, "the limit cannot be read", {}};
   if (*value == UINT64_MAX) return {name, Health::ok, "no limit", {}};
   if (*value >= enough) return {name, Health::ok, fmt::to_string(*value), {}};
-  return {name, Health::warning, fmt::format("{}: {}", *value, purpose), remedy};
+  return {name, Health::warning, fmt::format("{}{}: {}", *value, unit, purpose), remedy};
 }
 
 bool hasCapability(const Host& host, unsigned number) {
@@ -68,8 +68,8 @@ Finding checkMaps(const Host& host) {
 
 Finding checkAddressSpace(const Host& host) {
   return checkAtLeast("limit of address space", host.limit("Max address space"),
-                      std::uint64_t{4} << 30, "bytes, and every mapped segment counts towards it",
-                      "ulimit -v unlimited");
+                      std::uint64_t{4} << 30, "every mapped segment counts towards it",
+                      "ulimit -v unlimited", " bytes");
 }
 
 Finding checkInotify(const Host& host) {

@@ -107,8 +107,8 @@ struct WindowView {
                 wakes = 0;
   std::uint64_t linksOpened = 0, linksClosed = 0, peersDied = 0, protocolErrors = 0, alarms = 0;
   std::optional<Handling> handling;  // the request that a server works on
+  std::int64_t progressAtNs = 0;  // CLOCK_MONOTONIC: earliest time at which `handling` began
   std::uint64_t fanOutBytes = 0;  // shared memory of the fan-out pool of a server
-  std::int64_t progressAtNs = 0;  // CLOCK_MONOTONIC: earliest time at which that began
   Latencies queueWait;
   Latencies service;
   std::vector<LinkView> links;  // sorted by location, server and incarnation

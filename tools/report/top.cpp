@@ -131,7 +131,7 @@ void addTop(CLI::App& app, Run& run) {
                   "Print the table this number of times, without a live screen")
       ->check(wholeNumber(1, 1'000'000'000));
   auto* clients = command.add_flag("--clients", arguments->clients, "Show the clients first");
-  command.add_flag("--routers", arguments->routers, "Begin with the connections to other hosts")
+  command.add_flag("--routers", arguments->routers, "Show the connections to other hosts first")
       ->excludes(clients);
   command.add_option("--sort", arguments->sort, "Heading of the column to sort by");
   command.add_option("--filter", arguments->filter, "Show only rows that contain this text");

@@ -142,7 +142,7 @@ TopTable topLinks(const SnapshotDelta& delta, const WindowView& window) {
 }
 
 TopTable topLink(const SnapshotDelta& delta, const LinkView& link) {
-  TopTable table{{"OF THE LINK", "NOW"}, {}};
+  TopTable table{{"LINK", "VALUE"}, {}};
   const auto add = [&](const char* name, std::string text) {
     table.rows.push_back({table.rows.size() + 1, false, {{name, 0}, {std::move(text), 0}}});
   };
@@ -193,7 +193,7 @@ TopTable topRouters(const SnapshotDelta& delta) {
 }
 
 TopTable topLine(const SnapshotDelta& delta, const RouterView& router, const RouterLineView& line) {
-  TopTable table{{"OF THE CONNECTION", "NOW"}, {}};
+  TopTable table{{"CONNECTION", "VALUE"}, {}};
   const auto add = [&](const char* name, std::string text) {
     table.rows.push_back({table.rows.size() + 1, false, {{name, 0}, {std::move(text), 0}}});
   };

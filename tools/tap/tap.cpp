@@ -30,6 +30,8 @@ struct TapArguments : ServerArguments {
   bool printAll = false;
 };
 
+// Of the number of a link, which is random: fewer digits are a number cut short.
+constexpr std::size_t kFewestDigits = 8;
 constexpr int kShortPauses = 32;  // ratio of the longest pause to the shortest
 
 std::uint64_t linkNumber(const std::string& digits) {
@@ -37,11 +39,10 @@ std::uint64_t linkNumber(const std::string& digits) {
   const auto* const end = digits.data() + digits.size();
   if (digits.empty()) return 0;
   if (const auto [at, failure] = std::from_chars(digits.data(), end, number, 16);
-      failure == std::errc{} && at == end && digits.size() == 16)
+      failure == std::errc{} && at == end && digits.size() >= kFewestDigits)
     return number;
   throw std::invalid_argument(fmt::format(
-      "tap: \"{}\" is not a link: use the 16 hexadecimal digits that tap and inspect show",
-      digits));
+      "tap: \"{}\" is not a link: use its hexadecimal number, as tap and inspect show it", digits));
 }
 
 std::unique_ptr<TapSink> sinkFor(const TapArguments& arguments) {
@@ -98,7 +99,7 @@ void addTap(CLI::App& app, Run& run) {
   command.add_option("--count", arguments->count, "End after this many messages; 0: no limit")
       ->capture_default_str()
       ->check(wholeNumber(0));
-  command.add_option("--link", arguments->link, "Only this link: its 16 hexadecimal digits");
+  command.add_option("--link", arguments->link, "Only this link: its hexadecimal number");
   command
       .add_option("--write", arguments->file,
                   "Write to this file, for `mpf replay`, instead of to stdout")
@@ -110,8 +111,8 @@ void addTap(CLI::App& app, Run& run) {
   command.footer(
       "->: a request; <-: the reply that ends it; < : another message of the server. The number is "
       "the request's.\n"
-      "Messages that arrived faster than tap could read are counted as missed. The user and the "
-      "group of a link may read it, and root.");
+      "Messages that arrived faster than tap could read are counted as missed. Only the owner of a "
+      "link, its group and root may read it.");
   command.callback([arguments, &run] { run = [arguments] { return tap(*arguments); }; });
 }
 

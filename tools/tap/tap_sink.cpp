@@ -34,7 +34,7 @@ class LineSink final : public TapSink {
   void opened(std::int64_t atNs, const TappedLink& link) override {
     const auto client = link.client.empty() ? "a client that has ended"
                                             : fmt::format("{}[{}]", link.client, link.clientPid);
-    show(fmt::format("{}  --   {} and {}: link {:016x}\n", begin(atNs, link), printable(client),
+    show(fmt::format("{}  --   {} and {}: link {:x}\n", begin(atNs, link), printable(client),
                      printable(link.server), link.incarnation));
   }
   // A reply that does not end a request, for example one of a subscription, has a shorter arrow.
@@ -93,7 +93,7 @@ class JsonSink final : public TapSink {
  private:
   static void add(std::int64_t atNs, const TappedLink& link, nlohmann::json event) {
     event["at_ns"] = atNs;
-    event["link"] = fmt::format("{:016x}", link.incarnation);
+    event["link"] = fmt::format("{:x}", link.incarnation);
     show(jsonText(event, -1) + "\n");
   }
 };

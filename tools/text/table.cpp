@@ -87,7 +87,7 @@ std::string Table::text(const std::string& indent) const {
 
 std::string Table::fitted(const std::string& indent) const {
   const auto widths = fit(lineColumns() - indent.size());
-  const bool goesOn = columns_.size() > 1 && !columns_.back().isRight;
+  const bool wrapsLastColumn = columns_.size() > 1 && !columns_.back().isRight;
   std::string text;
   for (auto row : rows_) {
     if (columnsOf(row.front()) > widths.front()) {
@@ -95,8 +95,8 @@ std::string Table::fitted(const std::string& indent) const {
       row.front().clear();
     }
     auto line = indent;
-    line += cells(row, widths, row.size() - (goesOn ? 1 : 0));
-    if (goesOn) {
+    line += cells(row, widths, row.size() - (wrapsLastColumn ? 1 : 0));
+    if (wrapsLastColumn) {
       const auto width = columnsOf(line);
       if (width + kLeastCut <= lineColumns()) line = wrap(line, row.back(), width);
       else line += row.back();

@@ -31,9 +31,10 @@ Value ipacAddCarrier(CommandCall& call, StartupSite& site) {
   }
   const bool isSymbol = type.is(Value::Kind::address) || type.is(Value::Kind::undefined);
   if (!isSymbol || !isParameterKind(type.name())) {
-    call.refuse(0, fmt::format("{} is no type of carrier; write &vipc616_01, &ipmv162 or another "
-                               "symbol of drvIpac",
-                               type.description()));
+    call.refuse(0,
+                fmt::format("{} is not a type of carrier; write &vipc616_01, &ipmv162 or another "
+                            "symbol of drvIpac",
+                            type.description()));
     return Value::unavailable();
   }
   return addBoard(call, site, type.name(), 1).is(Value::Kind::unavailable) ? Value::unavailable()
@@ -93,7 +94,7 @@ SiteArguments readSite(CommandCall& call, std::size_t index, Boards& boards) {
                                    where.carrier, where.carrier));
   if (call.isValid() && (where.site.size() != 4 || !where.site.starts_with("IP_") ||
                          where.site[3] < 'a' || where.site[3] > 'f'))
-    call.refuse(index + 1, fmt::format("site \"{}\"; write IP_a, IP_b, IP_c or IP_d", where.site));
+    call.refuse(index + 1, fmt::format("site \"{}\"; write IP_a to IP_f", where.site));
   return where;
 }
 

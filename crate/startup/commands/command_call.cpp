@@ -77,7 +77,7 @@ void CommandCall::refuseType(std::size_t index, std::string_view what, std::stri
   } else if (!has(index)) {
     refuse(index, fmt::format("argument {}, {}, is missing", index + 1, what));
   } else if (value.is(Value::Kind::undefined)) {
-    refuse(index, fmt::format("undefined symbol {}, which is to be the {}: assign {} to it before",
+    refuse(index, fmt::format("undefined symbol {} as {}: assign {} to it before this line",
                               value.name(), what, expected));
   } else {
     refuse(index, fmt::format("{} is {}; {} is expected", what, value.description(), expected));

@@ -30,7 +30,7 @@ crate::Process* readModule(CommandCall& call, StartupSite& site, std::size_t ind
   const auto* const handle = value.opaque<ModuleHandle>();
   const auto name = handle != nullptr ? handle->name : value.text().value_or("");
   if (auto* const module = site.findModule(kind, name)) return module;
-  call.refuse(index, fmt::format("{} is no module of {}, which must come before this line",
+  call.refuse(index, fmt::format("{} is not a module of {}, which must come before this line",
                                  value.description(), creator));
   return nullptr;
 }

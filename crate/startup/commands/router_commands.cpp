@@ -49,9 +49,10 @@ Route readRoute(CommandCall& call, StartupSite& site, const char* role) {
   if (address.empty()) {
     address = call.text(2, "address");
     if (!isAddress(address))
-      call.refuse(2, fmt::format("\"{}\" is no address of a host; write it as \"10.0.0.7\", or "
-                                 "replace it by --address",
-                                 address));
+      call.refuse(2,
+                  fmt::format("\"{}\" is not the address of a host; write it as \"10.0.0.7\", or "
+                              "replace it by --address",
+                              address));
   }
   const auto bufferSize = call.integer(3, "bufSize", 0, 64 << 20);
   const auto queueSize = call.integer(4, "queueSize", 0, 1'000'000);

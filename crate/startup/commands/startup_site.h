@@ -24,7 +24,7 @@ struct ModuleHandle {
 struct StartupSite {
   Boards boards;
   SerialLines serialLines;
-  std::deque<crate::Process> modules;  // DAC128V, IP330, digital I/O; references stay valid
+  std::deque<crate::Process> modules;  // DAC128V, IP330, digital I/O, GPIB; references stay valid
   std::deque<crate::Process> routers;
   std::deque<crate::Process> sniffers;
   IocFile ioc;

@@ -19,10 +19,11 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 StartupFile StartupFile::ofContent(std::string content) {
   if (content.size() > StartupShell::Limits::kFileBytes)
-    throw std::runtime_error(fmt::format("the file has more than {} MiB, so it is no startup file",
-                                         StartupShell::Limits::kFileBytes >> 20));
+    throw std::runtime_error(
+        fmt::format("the file has more than {} MiB, so it is not a startup file",
+                    StartupShell::Limits::kFileBytes >> 20));
   if (content.find('\0') != std::string::npos)
-    throw std::runtime_error("the file contains null characters, so it is no startup file");
+    throw std::runtime_error("the file contains null characters, so it is not a startup file");
   return StartupFile(std::move(content));
 }
 

@@ -32,7 +32,7 @@ void checkLine(std::string_view line) {
   const auto* const found = std::ranges::find_if(line, isControl);
   if (found != line.end())
     throw LineError{static_cast<std::size_t>(found - line.begin()) + 1,
-                    "a control character is no part of a command: remove it"};
+                    "a command must not contain control characters: remove this one"};
 }
 
 bool isComment(std::string_view line) {

@@ -8,7 +8,7 @@
 namespace mpf {
 namespace {
 
-// NOLINTNEXTLINE(google-build-using-namespace): the words of the header, most of them
+// NOLINTNEXTLINE(google-build-using-namespace): most constants of <mpf/gpib_commands.h>
 using namespace gpib;
 
 GpibReply replyOf(const GpibRequest& request, GpibResult&& result) {

@@ -12,7 +12,7 @@
 namespace mpf {
 namespace {
 
-// NOLINTNEXTLINE(google-build-using-namespace): the words of the header, most of them
+// NOLINTNEXTLINE(google-build-using-namespace): most constants of <mpf/gpib_commands.h>
 using namespace gpib;
 
 constexpr std::int32_t kOptions = cmdTimeoutMilliseconds | cmdWithoutEnd;
@@ -115,8 +115,9 @@ std::string readCommand(const Char8Array& fields, GpibRequest& request) {
   const bool isKnown = request.command >= cmdRead && request.command <= cmdUnsubscribe &&
                        (fields.cmd & ~(cmdCommandMask | kOptions)) == 0;
   if (!isKnown)
-    return fmt::format("cmd {:#x} has no such command or option: use those of gpib_commands.h",
-                       static_cast<std::uint32_t>(fields.cmd));
+    return fmt::format(
+        "cmd {:#x} is not a command, or has an unknown option: see <mpf/gpib_commands.h>",
+        static_cast<std::uint32_t>(fields.cmd));
   if (fields.timeout < 0) return fmt::format("timeout {}: use 0 or more", fields.timeout);
   if (!request.sendEnd && request.command != cmdWrite)
     return fmt::format("a {} without END: the option is for writes",

@@ -11,7 +11,7 @@
 namespace mpf {
 namespace {
 
-// NOLINTNEXTLINE(google-build-using-namespace): the words of the header, most of them
+// NOLINTNEXTLINE(google-build-using-namespace): most constants of <mpf/gpib_commands.h>
 using namespace gpib;
 
 std::vector<std::uint8_t> bytesOf(const std::string& text) { return {text.begin(), text.end()}; }

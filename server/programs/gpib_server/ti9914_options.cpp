@@ -30,7 +30,7 @@ MeterStart readMeter(OptionFields& words) {
   const auto address = GpibAddress::fromNumber(number);
   if (!address)
     words.complain(fmt::format(
-        "{} is no GPIB address: 0 to 30, or 100 * primary + secondary address", number));
+        "{} is not a GPIB address: use 0 to 30, or 100 * primary + secondary address", number));
   return {*address, words.word("wire", "")};
 }
 

@@ -82,7 +82,7 @@ IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& k
     } catch (const std::invalid_argument&) {
       throw;  // waiting does not help
     } catch (const std::runtime_error& error) {
-      if (!waits_ || isForGood(error)) throw;
+      if (!waits_ || isPermanent(error)) throw;
       if (std::exchange(logged, error.what()) != error.what())
         log->warn("waiting for the board: {}", error.what());
     }
@@ -90,7 +90,7 @@ IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& k
   }
 }
 
-bool Hardware::isForGood(const std::runtime_error& error) {
+bool Hardware::isPermanent(const std::runtime_error& error) {
   const auto* const known = dynamic_cast<const IndustryPackError*>(&error);
   if (known == nullptr) return false;
   const auto status = known->status();

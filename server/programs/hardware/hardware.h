@@ -76,9 +76,9 @@ class Hardware {
   //   throws  also the errors that --wait would wait for
   [[nodiscard]] IndustryPackModule& openNow(const ModulePlace& place, const ModuleKind& kind,
                                             const MakeModel& makeModel, const ServerLog& log);
-  // True for errors that waiting does not mend: wrong parameters, a bus that this host does not
+  // True for errors that waiting does not cure: wrong parameters, a bus that this host does not
   // have.
-  [[nodiscard]] static bool isForGood(const std::runtime_error& error);
+  [[nodiscard]] static bool isPermanent(const std::runtime_error& error);
 
   // Logs the priority at which the interrupts of modules are served, for drivers with interrupts.
   void logPriority(const ServerLog& log) const;

@@ -12,7 +12,7 @@
 namespace mpf {
 namespace {
 
-// NOLINTNEXTLINE(google-build-using-namespace): the manual's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): all constants of <mpf/serial_commands.h>
 using namespace serial;
 
 constexpr std::uint64_t kMostAlarmsAtOnce = 100'000;  // a driver's counter may jump
@@ -69,9 +69,13 @@ std::string LineFaults::textOf(const Counts& counts) {
     kinds.push_back(withCount(counts.framing, "framing error", "framing errors"));
   if (counts.breaks > 0) kinds.push_back(withCount(counts.breaks, "break", "breaks"));
   auto text = fmt::format("{}", fmt::join(kinds, ", "));
-  if (counts.overruns > 0) text += "; this program got no processor in time, see mpf doctor";
+  if (counts.overruns > 0)
+    text +=
+        "; the program was not scheduled in time: `mpf doctor` shows how to allow real-time "
+        "priority";
   if (counts.parity + counts.framing > 0)
-    text += "; do both ends have the same settings, and is the cable good?";
+    text +=
+        "; check that both ends have the same baud rate, parity and stop bits, and check the cable";
   return text;
 }
 

@@ -69,7 +69,7 @@ class LineReader final : public ByteHandler {
     std::string bytes;
     bool overflow = false;
     bool wasDisturbed = false;  // input arrived before the question was sent: it was not sent
-    // bits of serial_server.h: bytes are missing or were damaged within it or right before it
+    // serialFault...: bytes of the answer, or right before it, are missing or damaged
     std::uint8_t faults = 0;
   };
   // Returns the answer of the read that has ended.

@@ -32,7 +32,7 @@ bool SerialPorts::tryOpenModule(const OctalUartStart& start) {
     openModule(start);
     return true;
   } catch (const std::runtime_error& error) {
-    if (!options_.hardware.waits() || Hardware::isForGood(error)) throw;
+    if (!options_.hardware.waits() || Hardware::isPermanent(error)) throw;
     log_->warn("waiting for the board: {}", error.what());
     return false;
   }

@@ -13,7 +13,7 @@
 namespace mpf {
 namespace {
 
-// NOLINTNEXTLINE(google-build-using-namespace): the manual's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): all constants of <mpf/serial_commands.h>
 using namespace serial;
 
 // A client may exit right after a write: the write continues for this time.

@@ -52,7 +52,7 @@ TEST_F(CheckCrateTest, NeedsNameProcesses) {
                         "\"one\"?"));
   EXPECT_THAT(errorsOf(kOne + "needs = [\"b\"]\n[[program]]\nname = \"b\"\ncommand = \"b\"\n"
                               "needs = [\"one\"]\n"),
-              HasSubstr("the needs form a circle: one needs b needs one"));
+              HasSubstr("the needs form a cycle: one needs b needs one"));
 }
 
 TEST_F(CheckCrateTest, ModulesAreOnCarriersOfTheCrate) {

@@ -169,7 +169,7 @@ TEST_F(InterruptThreadTest, ReportsADeadLineOnce) {
   std::atomic<int> told = 0;
   InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .lateLimit = 3}, serve(),
                          [&](InterruptFault fault) {
-                           EXPECT_EQ(fault, InterruptFault::never);
+                           EXPECT_EQ(fault, InterruptFault::dead);
                            ++told;
                          });
   carrier_.setFault("IP_a", ModelFault::interruptsLost);
@@ -187,7 +187,7 @@ TEST_F(InterruptThreadTest, DoesNotReportALineAsDeadThatItHasMasked) {
   InterruptThread thread(
       carrier_.site(0).interrupt(0),
       {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h, .lateLimit = 3}, serve(),
-      [&](InterruptFault fault) { dead += fault == InterruptFault::never ? 1 : 0; });
+      [&](InterruptFault fault) { dead += fault == InterruptFault::dead ? 1 : 0; });
   while (thread.counters().storms == 0) std::this_thread::yield();
   for (int i = 0; i < 10; ++i) {
     io().write16(0, 1);

@@ -84,14 +84,15 @@ TEST(LinkOptions, ErrorsNameTheKeyAndWhatIsValid) {
            Invalid{"range=5", "range=5: use <low>:<high>"},
            Invalid{"cmd", "\"cmd\": use <key>=<value>"},
            Invalid{"cmd=1 cmd=2", "cmd: use the key once"},
-           Invalid{"adress=1", "invalid key \"adress\": an input record has type, cmd, address"},
-           Invalid{"rewrite=yes", "invalid key \"rewrite\": an input record has"},
+           Invalid{"adress=1",
+                   "invalid key \"adress\": the keys of an input record are type, cmd, address"},
+           Invalid{"rewrite=yes", "invalid key \"rewrite\": the keys of an input record are"},
        })
     EXPECT_THAT([&] { input(text); }, ThrowsMessage<std::invalid_argument>(HasSubstr(message)));
   EXPECT_THAT([] { output("mode=read"); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("mode=read: use write")));
   EXPECT_THAT([] { output("value=1"); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("an output record has")));
+              ThrowsMessage<std::invalid_argument>(HasSubstr("the keys of an output record are")));
 }
 
 }  // namespace

@@ -166,7 +166,7 @@ TEST_F(TapTest, FollowsOneChosenLink) {
     const auto wrong = run({"tap", "echo", "--link", word});
     EXPECT_EQ(wrong.status, 2);
     EXPECT_THAT(wrong.err, HasSubstr(std::string("\"") + word +
-                                     "\" is not a link: use the 16 hexadecimal digits"));
+                                     "\" is not a link: use its hexadecimal number"));
   }
 }
 

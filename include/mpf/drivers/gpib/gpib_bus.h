@@ -46,7 +46,7 @@ struct GpibBusOptions {
   std::chrono::milliseconds pollServiceRequestEvery{50};
 };
 
-// A user of the bus. Operations with the id of the lease's holder pass; 0 is nobody's id.
+// A user of the bus. Operations with the id of the lease's holder pass; 0 means no user.
 using GpibUser = std::uint64_t;
 
 // The present holder of the lease.

@@ -49,7 +49,7 @@ enum class InterruptFault : std::uint8_t {
   storm,  // the line is stuck; reported once until the storm ends
   polled,  // the carrier gets no interrupts any more and polls from now on
   // the chip has requests, but no interrupt comes; ends with the next interrupt. Not during a storm
-  never,
+  dead,
 };
 
 class InterruptThread {

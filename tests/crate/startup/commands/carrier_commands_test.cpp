@@ -43,7 +43,7 @@ TEST_F(CarrierCommands, TheCommandsOfLaterReleasesReturnTheNumber) {
 
 TEST_F(CarrierCommands, RefuseWhatIsNoCarrier) {
   EXPECT_THAT(errorOf("ipacAddCarrier(&vipc617, \"\")\n"),
-              HasSubstr("1:16: error: ipacAddCarrier: &vipc617 is no type of carrier"));
+              HasSubstr("1:16: error: ipacAddCarrier: &vipc617 is not a type of carrier"));
   EXPECT_THAT(errorOf("ipacAddCarrier(&vipc616_01, \"rubbish\")\n"),
               HasSubstr("1:29: error: ipacAddCarrier: "));
   EXPECT_THAT(errorOf("initIpacCarrier(\"ipac\", 0)\n"), HasSubstr("there is no carrier 0"));

@@ -64,7 +64,7 @@ TEST_F(Ip330Commands, TheFormOfReleaseOneCreatesTheModule) {
 
 TEST_F(Ip330Commands, RefuseWhatIsNoModule) {
   EXPECT_THAT(errorOf("initIp330Scan(pIp330, \"scan\", 0, 15, 100, 20)\n"),
-              HasSubstr("1:15: error: initIp330Scan: undefined symbol pIp330 is no module of "
+              HasSubstr("1:15: error: initIp330Scan: undefined symbol pIp330 is not a module of "
                         "initIp330, which must come before this line"));
   EXPECT_THAT(errorOf(kModule + "initIp330PID(\"pid\", p, 0, p, 1, 20)\n"),
               HasSubstr("4:27: error: initIp330PID: "));

@@ -46,8 +46,9 @@ TEST_F(RouterCommands, MayBeRepeatedWithTheSameLocation) {
 }
 
 TEST_F(RouterCommands, RefuseInvalidArguments) {
-  EXPECT_THAT(errorOf("tcpMessageRouterClientStart(1, 9900, \"#.#.#.#\", 1500, 40)\n"),
-              HasSubstr("1:38: error: tcpMessageRouterClientStart: \"#.#.#.#\" is no address"));
+  EXPECT_THAT(
+      errorOf("tcpMessageRouterClientStart(1, 9900, \"#.#.#.#\", 1500, 40)\n"),
+      HasSubstr("1:38: error: tcpMessageRouterClientStart: \"#.#.#.#\" is not the address"));
   EXPECT_THAT(errorOf("tcpMessageRouterClientStart(1, 9900, Remote, 1500, 40)\n"),
               HasSubstr("1:38: error: tcpMessageRouterClientStart: undefined symbol Remote"));
   EXPECT_THAT(errorOf("tcpMessageRouterServerStart(1, 99000, \"a\", 1500, 40)\n"),

@@ -81,7 +81,7 @@ TEST(Ti9914Options, RefuseInvalidFields) {
   EXPECT_THAT(refusalOfTi9914("--ti9914 a,ipac"), HasSubstr("site is missing"));
   EXPECT_THAT(refusalOfTi9914("--ti9914 a,ipac,IP_a,x"), HasSubstr("is not a whole number"));
   EXPECT_THAT(refusalOfTi9914("--ti9914 a,ipac,IP_a,1,2"), HasSubstr("unexpected field \"2\""));
-  EXPECT_THAT(refusalOfTi9914("--meter 31"), HasSubstr("31 is no GPIB address"));
+  EXPECT_THAT(refusalOfTi9914("--meter 31"), HasSubstr("31 is not a GPIB address"));
 }
 
 TEST(Ti9914Options, AWireNeedsTheFileOfTheWires) {
