@@ -10,7 +10,7 @@
 //   MODELS  client/connector.cpp: tryFindServer tryOpenLink askForAcceptance publishPendingBind closeLink
 //   MODELS  client/binding.cpp: tryConnect onLinkState disconnect nudge leave
 //   MODELS  server/acceptor.cpp: acceptAll rescan accept open
-//   MODELS  server/connections.cpp: add open closeIfClientDid closeDead close
+//   MODELS  server/connections.cpp: add open closeIfClientClosed closeDead close
 //   MODELS  shm/window.cpp: knock notify
 //   MODELS  shm/knocks.cpp: tryTake takeRescan
 //   MODELS  shm/peer_windows.cpp: tryOpen settleAll

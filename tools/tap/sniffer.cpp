@@ -37,7 +37,7 @@ class Sniffer {
     const auto end =
         options_.seconds > 0 ? Deadline::after(ofSeconds(options_.seconds)) : Deadline::never();
     if (!client_.isConnected()) {
-      printError("{}: {}; check with `mpf ls` that it is {} and running\n", program_,
+      printError("{}: {}; check with `mpf ls` that it is {}\n", program_,
                  client_.notConnectedBecause(), options_.kind);
       return 1;
     }

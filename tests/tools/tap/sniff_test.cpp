@@ -183,8 +183,9 @@ TEST_F(SniffToolTest, NamesAnAbsentServer) {
   const auto ended = runTool({"sniff", "nobody", "0.1"}, backplane_.name());
 
   EXPECT_EQ(ended.status, 1);
-  EXPECT_THAT(ended.err, ContainsRegex("^mpf sniff: server \"nobody.sniff\" at location 0 is not "
-                                       "there.*; check with `mpf ls` that it is a serial server"));
+  EXPECT_THAT(ended.err,
+              ContainsRegex("^mpf sniff: server \"nobody.sniff\" at location 0 is not running.*"
+                            "; check with `mpf ls` that it is a serial server"));
 }
 
 TEST_F(SniffToolTest, ReportsAServerThatRefusesToSniff) {

@@ -106,7 +106,7 @@ TEST(GpibRequest, AnInvalidRequestHasAProblem) {
   const auto problemOf = [](const Char8Array& fields, std::string_view value = {}) {
     return requestOf(fields, value).problem;
   };
-  EXPECT_THAT(problemOf({}), HasSubstr("no such command"));
+  EXPECT_THAT(problemOf({}), HasSubstr("cmd 0x0 is not a command"));
   EXPECT_THAT(problemOf({.cmd = cmdUnsubscribe + 1}), HasSubstr("cmd 0x11"));
   EXPECT_THAT(problemOf({.cmd = cmdRead | 0x400}), HasSubstr("cmd 0x401"));
   EXPECT_THAT(problemOf({.cmd = -1}), HasSubstr("cmd 0xffffffff"));

@@ -243,7 +243,8 @@ TEST_F(LineFaultsTest, AStormCausesFewLogLinesWithPortKindsAndCounts) {
   EXPECT_GE(lines.written, 1U);
   EXPECT_LE(lines.written, LogLimiter::kAtOnce + 1 + periods) << log;
   const auto last = log.substr(log.rfind(name) + name.size());
-  EXPECT_THAT(last, testing::StartsWith("500 parity errors, 500 framing errors; do both ends"))
+  EXPECT_THAT(last,
+              testing::StartsWith("500 parity errors, 500 framing errors; check that both ends"))
       << log;
 }
 
