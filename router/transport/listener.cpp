@@ -134,8 +134,7 @@ kj::Promise<void> Listener::handshake(kj::AuthenticatedStream caller, const std:
              identity = kj::mv(identity)](FirstByte first) mutable -> kj::Promise<void> {
         KJ_IF_MAYBE (byte, first.value)
           return openTls({kj::mv(first.stream), kj::mv(identity)}, *byte, address);
-        return KJ_EXCEPTION(DISCONNECTED,
-                            "the peer closed the connection before it sent anything");
+        return KJ_EXCEPTION(DISCONNECTED, "the peer closed the connection before it sent anything");
       });
 }
 
