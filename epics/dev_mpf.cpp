@@ -19,6 +19,7 @@
 #include <recSup.h>
 #include <utility>
 
+#include "epics/fate_text.h"
 #include "epics/ioc_clients.h"
 #include "epics/link_address.h"
 #include "epics/record_queue.h"
@@ -209,12 +210,10 @@ class DevMpf::Impl final : public SharedClient::Member,
   long failFate(Fate fate) {
     switch (fate) {
       case Fate::refused:
-        return device_.fail(record_, "the server refused the request");
+        return device_.fail(record_, textOf(fate));
       case Fate::neverTaken:
-        recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "disconnected before the request");
-        break;
       case Fate::outcomeUnknown:
-        recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "disconnected before the reply");
+        recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "%s", textOf(fate));
         break;
       case Fate::expired:
       case Fate::cancelled:

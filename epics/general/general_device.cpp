@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "epics/fate_text.h"
 #include "epics/link_address.h"
 
 namespace mpf {
@@ -129,7 +130,7 @@ long GeneralDevice::take(dbCommon* record, const Message& message) {
   stored_.reset();
   if (const auto* fate = message.tryAs<RequestFate>()) {
     subscription_ = Subscription::none;
-    return fail(record, fmt::format("the request was {}", toString(fate->fate)).c_str());
+    return fail(record, textOf(fate->fate));
   }
   const auto reading = readingOf(message);
   if (!reading)

@@ -35,32 +35,53 @@ crate::Process* readModule(CommandCall& call, StartupSite& site, std::size_t ind
   return nullptr;
 }
 
-// initIp330("module", "carrier", "site", "type", "range", first, last, maxClients, vector)
-Value initIp330(CommandCall& call, StartupSite& site) {
-  const auto name = call.name(0, "module");
-  const auto where = readSite(call, 1, site.boards);
-  const auto type = call.letter(3, "type", "DS", 'S');
-  const auto range = call.textOr(4, "range", "-5to5");
-  auto process = newProcess("ip330", name, call.place(), call.source());
+// What both forms of the command that creates a module have, in this order.
+struct Ip330Module {
+  std::string name;
+  SiteArguments where;
+  char type;
+  std::string range;
+};
+
+Ip330Module readIp330(CommandCall& call, StartupSite& site) {
+  Ip330Module module{call.name(0, "module"), readSite(call, 1, site.boards),
+                     call.letter(3, "type", "DS", 'S'), call.textOr(4, "range", "-5to5")};
+  const auto& range = module.range;
+  if (range != "-5to5" && range != "-10to10" && range != "0to5" && range != "0to10")
+    call.refuse(4, fmt::format("range \"{}\"; write -5to5, -10to10, 0to5 or 0to10", range));
+  return module;
+}
+
+Value addIp330(CommandCall& call, StartupSite& site, const Ip330Module& module, std::int64_t first,
+               std::int64_t last, std::int64_t maxClients, std::int64_t vector) {
+  if (call.isValid() && site.findModule("ip330", module.name) != nullptr)
+    call.refuse(0, fmt::format("the module \"{}\" exists already", module.name));
+  if (!call.isValid()) return Value::unavailable();
+  auto process = newProcess("ip330", module.name, call.place(), call.source());
   const auto add = [&](const char* key, const auto& value) {
     addValue(process, key, fmt::format("{}", value), call.place());
   };
-  add("module", name);
-  add("carrier", where.carrier);
-  add("site", where.site);
-  add("type", type);
-  add("range", range);
-  add("first", call.integer(5, "firstChan", 0, 31));
-  add("last", call.integer(6, "lastChan", 0, 31));
-  add("maxclients", call.has(7) ? call.integer(7, "maxClients", 1, 1000) : 10);
-  add("vector", call.integer(8, "interrupt vector", 0, 255));
-  if (range != "-5to5" && range != "-10to10" && range != "0to5" && range != "0to10")
-    call.refuse(4, fmt::format("range \"{}\"; write -5to5, -10to10, 0to5 or 0to10", range));
-  if (call.isValid() && site.findModule("ip330", name) != nullptr)
-    call.refuse(0, fmt::format("the module \"{}\" exists already", name));
-  if (!call.isValid()) return Value::unavailable();
+  add("module", module.name);
+  add("carrier", module.where.carrier);
+  add("site", module.where.site);
+  add("type", module.type);
+  add("range", module.range);
+  add("first", first);
+  add("last", last);
+  add("maxclients", maxClients);
+  add("vector", vector);
   site.modules.push_back(std::move(process));
-  return Value::ofOpaque(ModuleHandle{name});
+  return Value::ofOpaque(ModuleHandle{module.name});
+}
+
+// initIp330("module", "carrier", "site", "type", "range", first, last, maxClients, vector)
+Value initIp330(CommandCall& call, StartupSite& site) {
+  const auto module = readIp330(call, site);
+  const auto first = call.integer(5, "firstChan", 0, 31);
+  const auto last = call.integer(6, "lastChan", 0, 31);
+  const auto maxClients = call.has(7) ? call.integer(7, "maxClients", 1, 1000) : 10;
+  const auto vector = call.integer(8, "interrupt vector", 0, 255);
+  return addIp330(call, site, module, first, last, maxClients, vector);
 }
 
 // configIp330(ip330, scanMode, "Input", usPerScan, secBetweenCal)
@@ -84,28 +105,10 @@ Value configIp330(CommandCall& call, StartupSite& site) {
 // The form of MPF R1-4, which creates the module, too: initIp330Scan("module", "carrier", "site",
 // "type", "range", vector, queueSize).
 Value initIp330AndScan(CommandCall& call, StartupSite& site) {
-  const auto name = call.name(0, "module");
-  const auto where = readSite(call, 1, site.boards);
-  const auto type = call.letter(3, "type", "DS", 'S');
-  const auto range = call.textOr(4, "range", "-5to5");
+  const auto module = readIp330(call, site);
   const auto vector = call.integer(5, "interrupt vector", 0, 255);
   static_cast<void>(call.integer(6, "queueSize", 0, kMaxQueue));
-  if (!call.isValid()) return Value::unavailable();
-  auto process = newProcess("ip330", name, call.place(), call.source());
-  const auto add = [&](const char* key, const auto& value) {
-    addValue(process, key, fmt::format("{}", value), call.place());
-  };
-  add("module", name);
-  add("carrier", where.carrier);
-  add("site", where.site);
-  add("type", type);
-  add("range", range);
-  add("first", 0);
-  add("last", type == 'D' ? 15 : 31);
-  add("maxclients", 10);
-  add("vector", vector);
-  site.modules.push_back(std::move(process));
-  return Value::ofOpaque(ModuleHandle{name});
+  return addIp330(call, site, module, 0, module.type == 'D' ? 15 : 31, 10, vector);
 }
 
 // initIp330Scan(ip330, "server", first, last[, msToAverage], queueSize)

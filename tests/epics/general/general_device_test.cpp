@@ -194,7 +194,7 @@ TEST_F(GeneralDeviceTest, ARefusedSubscriptionIsAReadAlarmAndRepeatedWhenTheReco
     static_cast<void>(self.reply(std::move(request)));
   });
   const Ioc ioc(longin("@s value=4 mode=subscribe", ""));
-  Ioc::waitFor("v.AMSG", "the request was refused");
+  Ioc::waitFor("v.AMSG", "the server refused the request");
   EXPECT_EQ(Ioc::get("v.STAT"), "READ");
 
   isRefusing = false;
@@ -281,7 +281,7 @@ TEST_F(GeneralDeviceTest, AReadbackThatTheServerDidNotReceiveInTimeIsSentAgain) 
       "record(longin, \"first\") { field(DTYP, \"MPF\") field(INP, \"@s\") field(PINI, \"YES\") "
       "}\n" +
       longout("@s readback=7 timeout=0.01"));
-  Ioc::waitFor("v.AMSG", "the request was expired");
+  Ioc::waitFor("v.AMSG", "no reply in time");
 
   isBusy = false;
 
@@ -298,7 +298,7 @@ TEST_F(GeneralDeviceTest, ASubscriptionThatTheServerDidNotReceiveInTimeIsSentAga
   };
   const Ioc ioc(longin("@s mode=subscribe timeout=0.01", ""));
   receive().reset();  // refused
-  Ioc::waitFor("v.AMSG", "the request was refused");
+  Ioc::waitFor("v.AMSG", "the server refused the request");
 
   static_cast<void>(Ioc::put("v.PROC", "1"));
   const auto expired = Deadline::after(std::chrono::milliseconds(20));

@@ -62,6 +62,15 @@ TEST_F(Ip330Commands, TheFormOfReleaseOneCreatesTheModule) {
                           "first=0", "last=31", "maxclients=10", "vector=120"));
 }
 
+TEST_F(Ip330Commands, TheFormOfReleaseOneIsCheckedAsTheLaterOne) {
+  EXPECT_THAT(
+      errorOf(kCarrier + "initIp330Scan(\"adc\", \"ipac\", \"IP_a\", \"S\", \"0to11\", 120, 20)\n"),
+      HasSubstr("range \"0to11\"; write -5to5"));
+  const std::string again =
+      "initIp330Scan(\"adc\", \"ipac\", \"IP_a\", \"S\", \"0to10\", 120, 20)\n";
+  EXPECT_THAT(errorOf(kCarrier + again + again), HasSubstr("the module \"adc\" exists already"));
+}
+
 TEST_F(Ip330Commands, RefuseWhatIsNoModule) {
   EXPECT_THAT(errorOf("initIp330Scan(pIp330, \"scan\", 0, 15, 100, 20)\n"),
               HasSubstr("1:15: error: initIp330Scan: undefined symbol pIp330 is not a module of "
