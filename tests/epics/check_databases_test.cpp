@@ -47,14 +47,17 @@ TEST(CheckDatabases, FailsWhenARecordDoesNotLoad) {
 }
 
 TEST(CheckDatabases, FailsWhenALinkIsInvalid) {
-  const TemporaryFolder folder;
-  static_cast<void>(folder.write(
-      "a.db", R"(record(ai, "v") { field(DTYP, "ip330Scan") field(INP, "#C0 S0 @adc,9") })"));
+  for (const std::string gain : {"9", "1x"}) {
+    const TemporaryFolder folder;
+    static_cast<void>(folder.write(
+        "a.db", "record(ai, \"v\") { field(DTYP, \"ip330Scan\") field(INP, \"#C0 S0 @adc," + gain +
+                    "\") }"));
 
-  const auto result = checkDatabases(folder.path());
+    const auto result = checkDatabases(folder.path());
 
-  EXPECT_EQ(WEXITSTATUS(result.status), 1);
-  EXPECT_THAT(result.output, HasSubstr("v: INP: gain \"9\": use 0, 1, 2 or 3"));
+    EXPECT_EQ(WEXITSTATUS(result.status), 1);
+    EXPECT_THAT(result.output, HasSubstr("v: INP: gain \"" + gain + "\": use 0, 1, 2 or 3"));
+  }
 }
 
 TEST(CheckDatabases, DatabasesOfSitesConnect) {

@@ -168,6 +168,8 @@ TEST_F(TapTest, FollowsOneChosenLink) {
     EXPECT_THAT(wrong.err, HasSubstr(std::string("\"") + word +
                                      "\" is not a link: use its hexadecimal number"));
   }
+  // As inspect prints a number below 2^60.
+  EXPECT_EQ(run({"tap", "echo", "0.1", "--link", "123456789abcdef"}).status, 0);
 }
 
 TEST_F(TapTest, FailsAtOnceWhenTheFileCannotBeWritten) {
