@@ -97,7 +97,7 @@ class BarePeer final : public Peer {
   void send() override { Spinning::post(words_->request.word, ++sent_); }
   void receive() override {
     Asleep::wait(words_->reply.word, ++received_);
-    // Its CPU time belongs to this row only if this process has waited for its end.
+    // The CPU time of the carrier counts as that of this row only after a wait for its end.
     if (context_->stopping()) killProcess(carrier_);
   }
 

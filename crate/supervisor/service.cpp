@@ -185,8 +185,7 @@ Action Service::action(bool areNeedsReady, std::int64_t nowNs) {
                   fmt::format("stalled for {}",
                               durationText(static_cast<double>(nowNs - *stalledSinceNs_))),
                   nowNs);
-        killAtNs_ =
-            nowNs;  // at once: a server that takes no messages does not handle SIGTERM either
+        killAtNs_ = nowNs;  // a server that takes no messages does not handle SIGTERM, either
       }
       break;
     default:

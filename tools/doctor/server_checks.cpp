@@ -39,23 +39,33 @@ OpenFiles openFilesOf(const Host& host, std::int32_t pid) {
   return files;
 }
 
-// Why a server cannot accept more clients, or soon cannot; empty when it can.
-std::string problemOf(const Host& host, const layout::SegmentHeader& header,
-                      const layout::WindowControl& control) {
+constexpr const char* kMoreFiles =
+    "start the server with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the systemd unit";
+
+struct Problem {
+  std::string seen, remedy;
+};
+
+// Why a server cannot accept more clients, or soon cannot; nullopt when it can.
+std::optional<Problem> tryProblemOf(const Host& host, const layout::SegmentHeader& header,
+                                    const layout::WindowControl& control) {
   const auto server = fmt::format("\"{}\" (pid {})", segments::text(header.name), header.ownerPid);
   switch (control.shortage.load(std::memory_order_relaxed)) {
     case layout::Shortage::descriptors:
-      return server + " refuses clients: no file descriptor is left";
+      return Problem{server + " refuses clients: no file descriptor is left", kMoreFiles};
     case layout::Shortage::openFiles:
-      return server + " refuses clients: the host has no open file left";
+      return Problem{server + " refuses clients: the host has no open file left",
+                     "sysctl fs.file-max=N, with a larger N than now"};
     case layout::Shortage::memory:
-      return server + " refuses clients: no memory is left";
+      return Problem{server + " refuses clients: no memory is left",
+                     "end programs that use much memory, or add memory"};
     default:
       break;
   }
   const auto files = openFilesOf(host, header.ownerPid);
-  if (!files.isNearlyFull()) return {};
-  return fmt::format("{} has {} of {} files open", server, files.used, files.limit);
+  if (!files.isNearlyFull()) return std::nullopt;
+  return Problem{fmt::format("{} has {} of {} files open", server, files.used, files.limit),
+                 kMoreFiles};
 }
 
 // A server window whose owner is alive; nullopt when the file is something else or this user may
@@ -76,23 +86,21 @@ std::optional<SegmentImage> livingServer(const std::filesystem::path& path) try 
 Finding checkServers(const Host& host) {
   constexpr const char* kName = "open files of servers";
   std::size_t servers = 0;
-  std::vector<std::string> problems;
+  std::vector<Problem> problems;
   for (const auto& name : host.list("dev/shm")) {
     const auto parsed = SegmentName::tryParse(name);
     if (!parsed || parsed->kind != NameKind::serverWindow) continue;
     const auto image = livingServer(host.root / "dev/shm" / name);
     if (!image) continue;
     ++servers;
-    if (auto problem = problemOf(host, image->header(), image->window()); !problem.empty())
-      problems.push_back(std::move(problem));
+    if (auto problem = tryProblemOf(host, image->header(), image->window()))
+      problems.push_back(std::move(*problem));
   }
   if (servers == 0) return {kName, Health::ok, "no server is running", {}};
   if (problems.empty()) return {kName, Health::ok, counted(servers, "server"), {}};
-  auto seen = problems.front();
+  auto [seen, remedy] = problems.front();
   if (problems.size() > 1) seen += fmt::format("; and {} more", problems.size() - 1);
-  return {kName, Health::problem, seen,
-          "start the server with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the systemd "
-          "unit"};
+  return {kName, Health::problem, seen, remedy};
 }
 
 }  // namespace mpf::tools

@@ -30,7 +30,7 @@ struct TapArguments : ServerArguments {
   bool printAll = false;
 };
 
-// Of the number of a link, which is random: fewer digits are a number cut short.
+// Of the number of a link. It is random, so one with fewer digits was cut off.
 constexpr std::size_t kFewestDigits = 8;
 constexpr int kShortPauses = 32;  // ratio of the longest pause to the shortest
 

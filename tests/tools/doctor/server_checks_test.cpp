@@ -50,14 +50,15 @@ TEST_F(ServerChecks, CountServersThatAreAlive) {
 
 TEST_F(ServerChecks, AServerThatRefusesClientsIsAProblem) {
   const auto server = "\"dac\" (pid " + std::to_string(::getpid()) + ") refuses clients: ";
-  const auto check = [&](layout::Shortage shortage, const std::string& reason) {
+  const auto check = [&](layout::Shortage shortage, const std::string& reason,
+                         const std::string& remedy) {
     const auto lock = copyServer(dac_, shortage);
-    expect(checkServers(host_), Health::problem, server + reason, "LimitNOFILE");
+    expect(checkServers(host_), Health::problem, server + reason, remedy);
   };
 
-  check(layout::Shortage::descriptors, "no file descriptor is left");
-  check(layout::Shortage::openFiles, "the host has no open file left");
-  check(layout::Shortage::memory, "no memory is left");
+  check(layout::Shortage::descriptors, "no file descriptor is left", "LimitNOFILE");
+  check(layout::Shortage::openFiles, "the host has no open file left", "fs.file-max");
+  check(layout::Shortage::memory, "no memory is left", "end programs");
 }
 
 TEST_F(ServerChecks, AServerWithNearlyAllFilesOpenIsAProblem) {
@@ -84,7 +85,7 @@ TEST_F(ServerChecks, NameTheFirstOfSeveralServers) {
   const auto first = copyServer(adc, layout::Shortage::memory);
   const auto second = copyServer(dac_, layout::Shortage::memory);
 
-  expect(checkServers(host_), Health::problem, "no memory is left; and 1 more", "ulimit -n");
+  expect(checkServers(host_), Health::problem, "no memory is left; and 1 more", "end programs");
   EXPECT_THAT(checkServers(host_).seen, testing::StartsWith("\"adc\""));
 }
 
