@@ -20,9 +20,9 @@ namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
-std::string shortName(const TappedLink& link) {
-  return fmt::format("{:04x}", link.incarnation >> 48);
-}
+// The number of a link, as the names of segments contain it; and what each line repeats of it.
+std::string linkText(const TappedLink& link) { return fmt::format("{:x}", link.incarnation); }
+std::string shortLink(const TappedLink& link) { return fmt::format("{:<4.4}", linkText(link)); }
 const char* directionText(Direction direction) {
   return direction == Direction::request ? "request" : "reply";
 }
@@ -34,8 +34,8 @@ class LineSink final : public TapSink {
   void opened(std::int64_t atNs, const TappedLink& link) override {
     const auto client = link.client.empty() ? "a client that has ended"
                                             : fmt::format("{}[{}]", link.client, link.clientPid);
-    show(fmt::format("{}  --   {} and {}: link {:x}\n", begin(atNs, link), printable(client),
-                     printable(link.server), link.incarnation));
+    show(fmt::format("{}  --   {} and {}: link {}\n", begin(atNs, link), printable(client),
+                     printable(link.server), linkText(link)));
   }
   // A reply that does not end a request, for example one of a subscription, has a shorter arrow.
   void message(std::int64_t atNs, const TappedLink& link, const TappedMessage& message) override {
@@ -59,7 +59,7 @@ class LineSink final : public TapSink {
   static std::string begin(std::int64_t atNs, const TappedLink& link) {
     return fmt::format("{:%H:%M:%S}.{:06}  {}",
                        fmt::localtime(static_cast<std::time_t>(atNs / kNsPerSecond)),
-                       atNs % kNsPerSecond / 1000, shortName(link));
+                       atNs % kNsPerSecond / 1000, shortLink(link));
   }
   std::size_t maxElements_;
 };
@@ -93,7 +93,7 @@ class JsonSink final : public TapSink {
  private:
   static void add(std::int64_t atNs, const TappedLink& link, nlohmann::json event) {
     event["at_ns"] = atNs;
-    event["link"] = fmt::format("{:x}", link.incarnation);
+    event["link"] = linkText(link);
     show(jsonText(event, -1) + "\n");
   }
 };
