@@ -64,20 +64,35 @@ LinkFollower::Side LinkFollower::begin(Direction direction, FollowFrom from) con
   const bool isRequest = direction == Direction::request;
   const auto* slots = &segment_.at<layout::Slot>(layout::kLinkRingsOffset);
   const auto* replies = slots + header().queueSlots;
-  const auto& sent = isRequest ? control.clientSent : control.serverSent;
-  for (int tries = 1;; ++tries) {
-    const auto before = from == FollowFrom::first ? 0 : sent.load(std::memory_order_relaxed);
-    const Side side{
-        isRequest ? RingFollower({slots, header().queueSlots}, {}, from)
-                  : RingFollower({replies, header().replySlots},
-                                 {replies + header().replySlots, header().moreReplySlots}, from),
-        sent, isRequest ? control.requests : control.replies, before};
-    // The counter and the position of the follower must belong together. If messages keep arriving,
-    // they agree only approximately.
-    if (from == FollowFrom::first || sent.load(std::memory_order_relaxed) == before ||
-        tries == kTries)
-      return side;
+  const auto makeFollower = [&] {
+    return isRequest ? RingFollower({slots, header().queueSlots}, {}, from)
+                     : RingFollower({replies, header().replySlots},
+                                    {replies + header().replySlots, header().moreReplySlots}, from);
+  };
+  Side side{makeFollower(), isRequest ? control.clientSent : control.serverSent,
+            isRequest ? control.requests : control.replies};
+  if (from == FollowFrom::first) return side;
+  // The counter and the position of the follower must belong together. If messages keep arriving,
+  // they agree only approximately.
+  for (int tries = 1; tries <= kTries && side.sent() != side.sentBefore; ++tries) {
+    side.sentBefore = side.sent();
+    side.follower = makeFollower();
   }
+  return side;
+}
+
+// The producer counts a message after it has published it, so the consumer may count it first.
+std::uint64_t LinkFollower::Side::sent() const noexcept {
+  return std::max(counter.load(std::memory_order_relaxed),
+                  consumer.taken.load(std::memory_order_relaxed));
+}
+
+void LinkFollower::Side::noteSent(std::uint64_t counted) noexcept {
+  // Without an overrun none was missed: one that is counted only now was sent before the follower
+  // began.
+  if (!wasOverrun) sentBefore = std::max(sentBefore, counted - std::min(counted, seen));
+  const auto since = counted - std::min(counted, sentBefore);
+  missed = since - std::min(since, seen);
 }
 
 bool LinkFollower::take(std::vector<TappedMessage>& messages) {
@@ -94,12 +109,12 @@ bool LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMess
   RingCopy copy;
   bool some = false;
   while (messages.size() < kBatch) {
+    const auto counted = side.sent();
     const auto next = side.follower.tryNext(copy);
     some = some || next != RingFollower::Next::nothing;
+    side.wasOverrun = side.wasOverrun || next == RingFollower::Next::overrun;
     if (next != RingFollower::Next::message) {
-      // The follower is behind the newest message: every message sent has been seen or missed.
-      const auto sent = side.sent.load(std::memory_order_relaxed) - side.sentBefore;
-      side.missed = sent > side.seen ? sent - side.seen : 0;
+      side.noteSent(counted);
       break;
     }
     ++side.seen;

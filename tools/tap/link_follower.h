@@ -57,11 +57,17 @@ class LinkFollower {
  private:
   struct Side {
     RingFollower follower;
-    const layout::Word64& sent;
+    const layout::Word64& counter;
     const layout::RingControl& consumer;
     std::uint64_t sentBefore = 0;  // messages sent before the follower began
     std::uint64_t seen = 0;
     std::uint64_t missed = 0;
+    bool wasOverrun = false;
+
+    // Messages sent so far. The last one may not be counted yet.
+    [[nodiscard]] std::uint64_t sent() const noexcept;
+    // The follower is behind all messages of `counted`: each has been seen or missed.
+    void noteSent(std::uint64_t counted) noexcept;
   };
   LinkFollower(const std::string& backplane, Segment segment, FollowFrom from);
   Side begin(Direction direction, FollowFrom from) const;
