@@ -2,11 +2,11 @@
 #include "base/command_line.h"
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <fmt/format.h>
 #include <limits>
 #include <system_error>
 
+#include "base/number.h"
 #include "base/print_error.h"
 #include "base/run_main.h"
 #include "base/version.h"
@@ -58,20 +58,12 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   return kExitUsage;
 }
 
-// Returns true and sets `value` if all of `text` is one number.
-template <class Number>
-bool isNumber(const std::string& text, Number& value) {
-  const auto* const end = text.data() + text.size();
-  const auto [stopped, error] = std::from_chars(text.data(), end, value);
-  return error == std::errc() && stopped == end;
-}
-
 template <class Number>
 CLI::Validator inRange(Number least, Number most) {
   return CLI::Validator(
       [least, most](const std::string& text) {
-        Number value{};
-        const bool good = isNumber(text, value) && value >= least && value <= most;  // NaN is not
+        const auto value = tryNumber<Number>(text);
+        const bool good = value && *value >= least && *value <= most;  // NaN is not
         if (good) return std::string();
         if (most == std::numeric_limits<Number>::max())
           return fmt::format("{} is out of range: use {} or more", text, least);

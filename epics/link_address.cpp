@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "epics/link_address.h"
 
-#include <charconv>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <string_view>
 
+#include "base/number.h"
 #include "epics/gpib_links.h"
 #include "shm/segment_name.h"
 
@@ -13,11 +13,8 @@ namespace mpf {
 namespace {
 
 std::int32_t locationOf(std::string_view text) {
-  std::int32_t location = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), location);
-  if (error != std::errc{} || end != text.data() + text.size())
-    throw std::invalid_argument(fmt::format("location \"{}\" is not an integer", text));
-  return location;
+  if (const auto location = tryNumber<std::int32_t>(text)) return *location;
+  throw std::invalid_argument(fmt::format("location \"{}\" is not an integer", text));
 }
 
 LinkAddress ofGpib(const gpibio& link) {

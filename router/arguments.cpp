@@ -2,11 +2,11 @@
 #include "router/arguments.h"
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <cstdio>
 #include <fmt/format.h>
 
 #include "base/command_line.h"
+#include "base/number.h"
 #include "base/print_error.h"
 #include "router/config/limit_text.h"
 #include "shm/rights_text.h"
@@ -24,9 +24,7 @@ constexpr const char* kFooter =
     "configuration.";
 
 std::int32_t parseLocation(std::string_view text) {
-  std::int32_t location = 0;
-  const auto [stopped, error] = std::from_chars(text.data(), text.data() + text.size(), location);
-  if (error == std::errc() && stopped == text.data() + text.size()) return location;
+  if (const auto location = tryNumber<std::int32_t>(text)) return *location;
   throw std::invalid_argument(fmt::format("\"{}\" is not a location: write an integer", text));
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "schema/text.h"
 
-#include <charconv>
 #include <cmath>
 #include <vector>
 
 #include <mpf/message_of.h>
 
+#include "base/number.h"
 #include "schema/visit.h"
 
 namespace mpf {
@@ -100,28 +100,26 @@ Expected parseInto(Integer& to, std::string_view text)
   std::string_view digits = text.substr(negative ? 1 : 0);
   const bool hexadecimal = digits.starts_with("0x") || digits.starts_with("0X");
   if (hexadecimal) digits.remove_prefix(2);
-  std::uint64_t magnitude = 0;
-  const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(),
-                                              magnitude, hexadecimal ? 16 : 10);
+  const auto magnitude = tryNumber<std::uint64_t>(digits, hexadecimal ? 16 : 10);
   const auto most = static_cast<std::uint64_t>(std::numeric_limits<Integer>::max());
   const auto allBits =
       static_cast<std::uint64_t>(std::numeric_limits<std::make_unsigned_t<Integer>>::max());
   const auto limit = negative      ? (std::is_signed_v<Integer> ? most + 1 : 0)
                      : hexadecimal ? allBits
                                    : most;
-  if (failure != std::errc{} || end != digits.data() + digits.size() || magnitude > limit) {
+  if (!magnitude || *magnitude > limit) {
     return "an integer from " + std::to_string(std::numeric_limits<Integer>::min()) + " to " +
            std::to_string(std::numeric_limits<Integer>::max());
   }
-  to = static_cast<Integer>(negative ? ~magnitude + 1 : magnitude);
+  to = static_cast<Integer>(negative ? ~*magnitude + 1 : *magnitude);
   return {};
 }
 
 Expected parseInto(double& to, std::string_view text) {
   text.remove_prefix(text.starts_with('+') ? 1 : 0);
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), to);
-  const bool good = failure == std::errc{} && end == text.data() + text.size();
-  return good ? Expected{} : "a number that a double can hold";
+  const auto number = tryNumber<double>(text);
+  to = number.value_or(0);
+  return number ? Expected{} : "a number that a double can hold";
 }
 
 Expected parseInto(char& to, std::string_view text) {
@@ -159,10 +157,9 @@ Expected parseElements(std::vector<std::byte>& to, std::string_view text) {
   Expected expected = "an even number of hexadecimal digits";
   if (text.size() % 2 != 0) return expected;
   for (std::size_t i = 0; i < text.size(); i += 2) {
-    std::uint8_t byte = 0;
-    const auto [end, failure] = std::from_chars(text.data() + i, text.data() + i + 2, byte, 16);
-    if (failure != std::errc{} || end != text.data() + i + 2) return expected;
-    to.push_back(std::byte{byte});
+    const auto byte = tryNumber<std::uint8_t>(text.substr(i, 2), 16);
+    if (!byte) return expected;
+    to.push_back(std::byte{*byte});
   }
   return {};
 }
@@ -318,13 +315,12 @@ std::optional<std::string> tryUnescape(std::string_view text) {
     } else if (text[i] == '0') {
       bytes += '\0';
     } else if (text[i] == 'x') {
-      std::uint8_t byte = 0;
-      const auto digits = text.substr(i + 1, 2);
-      const auto [end, failure] =
-          std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
-      if (failure != std::errc{}) return std::nullopt;
-      bytes += static_cast<char>(byte);
-      i += static_cast<std::size_t>(end - digits.data());
+      auto digits = text.substr(i + 1, 2);
+      const auto length = digits.size();
+      const auto byte = tryTakeNumber<std::uint8_t>(digits, 16);
+      if (!byte) return std::nullopt;
+      bytes += static_cast<char>(*byte);
+      i += length - digits.size();
     } else {
       return std::nullopt;
     }

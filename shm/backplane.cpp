@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/backplane.h>
 
-#include <charconv>
 #include <cstdlib>
 #include <fmt/format.h>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/number.h"
 #include "base/step.h"
 #include "shm/segment.h"
 #include "shm/segment_name.h"
@@ -80,9 +80,7 @@ Watcher& Backplane::watcher() const noexcept { return state_->itsWatcher(); }
 
 std::int32_t Backplane::defaultLocation() {
   const auto text = environmentOr("MPF_LOCATION", "0");
-  std::int32_t location = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), location);
-  if (error == std::errc{} && end == text.data() + text.size()) return location;
+  if (const auto location = tryNumber<std::int32_t>(text)) return *location;
   throw std::invalid_argument(fmt::format("MPF_LOCATION \"{}\": use an integer", text));
 }
 

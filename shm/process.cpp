@@ -10,10 +10,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstdio>
 #include <string_view>
 
+#include "base/number.h"
 #include "shm/fork_guard.h"
 
 namespace mpf {
@@ -30,9 +30,7 @@ std::uint64_t startTicksIn(const char* path) {
   fields.remove_prefix(std::min(fields.rfind(')'), fields.size()));
   for (int field = 2; field < 22; ++field)
     fields.remove_prefix(std::min(fields.find(' ') + 1, fields.size()));
-  std::uint64_t ticks = 0;
-  std::from_chars(fields.data(), fields.data() + fields.size(), ticks);
-  return ticks;
+  return tryTakeNumber<std::uint64_t>(fields).value_or(0);
 }
 
 // Start time of a process as /proc shows it, which may belong to another pid namespace. Returns 0
@@ -46,10 +44,9 @@ std::uint64_t startTicksOf(std::int32_t pid) {
 // Whether /proc shows the processes of our pid namespace.
 bool isProcOurs() noexcept {
   std::array<char, 32> text{};
-  std::int32_t self = 0;
-  if (const auto length = ::readlink("/proc/self", text.data(), text.size() - 1); length > 0)
-    std::from_chars(text.data(), text.data() + length, self);
-  return self == ::getpid();
+  const auto length = ::readlink("/proc/self", text.data(), text.size());
+  return length > 0 && tryNumber<std::int32_t>(std::string_view(
+                           text.data(), static_cast<std::size_t>(length))) == ::getpid();
 }
 
 std::uint64_t ownPidNamespace() {

@@ -2,11 +2,12 @@
 #include "shm/rights_text.h"
 
 #include <cerrno>
-#include <charconv>
 #include <fmt/format.h>
 #include <grp.h>
 #include <stdexcept>
 #include <vector>
+
+#include "base/number.h"
 
 namespace mpf {
 namespace {
@@ -17,12 +18,10 @@ constexpr mode_t kOwnerReadsAndWrites = 0600;
 }  // namespace
 
 mode_t parseMode(const std::string& text) {
-  mode_t mode = 0;
-  const auto* const end = text.data() + text.size();
-  const auto [stopped, error] = std::from_chars(text.data(), end, mode, 8);
-  if (error == std::errc() && stopped == end && (mode & ~kAnybodyReadsAndWrites) == 0 &&
-      (mode & kOwnerReadsAndWrites) == kOwnerReadsAndWrites) {
-    return mode;
+  const auto mode = tryNumber<mode_t>(text, 8);
+  if (mode && (*mode & ~kAnybodyReadsAndWrites) == 0 &&
+      (*mode & kOwnerReadsAndWrites) == kOwnerReadsAndWrites) {
+    return *mode;
   }
   throw std::invalid_argument(
       fmt::format("{}: use an octal number between 0600 and 0666, such as 0660", text));

@@ -2,11 +2,11 @@
 #include "shm/segment_name.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <vector>
 
+#include "base/number.h"
 #include "shm/layout.h"
 
 namespace mpf {
@@ -39,14 +39,6 @@ std::vector<std::string_view> split(std::string_view name) {
     if (dot == std::string_view::npos) return parts;
     name.remove_prefix(dot + 1);
   }
-}
-
-template <class Number>
-std::optional<Number> tryNumber(std::string_view text, int base) {
-  Number value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
 }
 
 std::optional<std::uint64_t> tryHex(std::string_view text) {
@@ -137,7 +129,7 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
   parsed.kind = static_cast<NameKind>(parts[2][0]);
   switch (parsed.kind) {
     case NameKind::serverWindow:
-      if (parts.size() != 5 || !tryNumber<std::int32_t>(parts[3], 10) || !isEncoded(parts[4]))
+      if (parts.size() != 5 || !tryNumber<std::int32_t>(parts[3]) || !isEncoded(parts[4]))
         return std::nullopt;
       return parsed;
     case NameKind::link: {
@@ -150,14 +142,13 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
     }
     case NameKind::fanOut: {
       const auto server = tryHex(parts[3]);
-      if (!server || parts.size() != 5 || !tryNumber<std::uint32_t>(parts[4], 10))
-        return std::nullopt;
+      if (!server || parts.size() != 5 || !tryNumber<std::uint32_t>(parts[4])) return std::nullopt;
       parsed.incarnation = *server;
       return parsed;
     }
     case NameKind::bulk:
       if (parts.size() != 6 || (parts[4] != "0" && parts[4] != "1") ||
-          !tryNumber<std::uint32_t>(parts[5], 10))
+          !tryNumber<std::uint32_t>(parts[5]))
         return std::nullopt;
       [[fallthrough]];
     case NameKind::clientWindow:

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <fmt/format.h>
 #include <map>
@@ -13,6 +12,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "base/number.h"
 #include "base/output_file.h"
 #include "base/print_error.h"
 #include "benchmarks/local/report.h"
@@ -57,10 +57,9 @@ Cpus parseCpus(const std::string& text) {
   Cpus cpus;
   std::istringstream words(text);
   for (std::string word; std::getline(words, word, '+');) {
-    int cpu = -1;
-    const auto* end = word.data() + word.size();
-    if (std::from_chars(word.data(), end, cpu).ptr != end || cpu < 0) return {};
-    cpus.push_back(cpu);
+    const auto cpu = tryNumber<int>(word);
+    if (!cpu || *cpu < 0) return {};
+    cpus.push_back(*cpu);
   }
   return cpus;
 }

@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <charconv>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
@@ -18,6 +17,7 @@
 
 #include <mpf/file_descriptor.h>
 
+#include "base/number.h"
 #include "base/printable.h"
 #include "base/system_call.h"
 #include "benchmarks/peers/mpf_peer.h"
@@ -35,11 +35,8 @@ using Pids = std::array<std::atomic<int>, 2>;
 
 std::optional<double> numberIn(std::string_view& text) {
   text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
-  double number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{} || number < 0) return std::nullopt;
-  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-  return number;
+  const auto number = tryTakeNumber<double>(text);
+  return number && *number >= 0 ? number : std::nullopt;
 }
 
 // The numbers after `key`; nullopt if the line has another key, or not exactly these numbers.
@@ -183,10 +180,9 @@ bool isOfDeadRun(std::string_view file) {
   const std::string_view prefix = kRunPrefix;
   if (!file.starts_with(prefix) || file.find('.') == std::string_view::npos) return false;
   file.remove_prefix(prefix.size());
-  int pid = 0;
-  const auto [end, error] = std::from_chars(file.data(), file.data() + file.size(), pid);
-  if (error != std::errc{} || *end != '-' || pid <= 0) return false;
-  return ::kill(pid, 0) != 0 && errno == ESRCH;
+  const auto pid = tryTakeNumber<int>(file);
+  if (!pid || !file.starts_with('-') || *pid <= 0) return false;
+  return ::kill(*pid, 0) != 0 && errno == ESRCH;
 }
 
 }  // namespace

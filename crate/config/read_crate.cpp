@@ -3,11 +3,11 @@
 #include "crate/config/read_crate.h"
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/number.h"
 #include "base/toml/toml_table.h"
 #include "crate/config/program_kinds.h"
 
@@ -25,12 +25,10 @@ Restart parseRestart(const std::string& text) {
 }
 
 int parseCount(const std::string& text) {
-  int value = 0;
-  const auto* const end = text.data() + text.size();
-  if (const auto parsed = std::from_chars(text.data(), end, value);
-      parsed.ec != std::errc() || parsed.ptr != end || value < 0)
+  const auto value = tryNumber<int>(text);
+  if (!value || *value < 0)
     throw std::invalid_argument(fmt::format("\"{}\": write a number, 0 or more", text));
-  return value;
+  return *value;
 }
 
 // Parses "4096", "64KiB", "4MiB" or "1GiB".
@@ -262,16 +260,14 @@ class CrateReader {
 
 milliseconds parseDuration(const std::string& text) {
   if (text == "off") return milliseconds(0);
-  std::int64_t number = 0;
-  const auto* const end = text.data() + text.size();
-  const auto parsed = std::from_chars(text.data(), end, number);
-  const std::string unit(parsed.ptr, end);
-  const std::map<std::string, std::int64_t> units{{"ms", 1}, {"s", 1000}, {"min", 60'000}};
+  std::string_view unit = text;
+  const auto number = tryTakeNumber<std::int64_t>(unit);
+  const std::map<std::string_view, std::int64_t> units{{"ms", 1}, {"s", 1000}, {"min", 60'000}};
   const auto found = units.find(unit);
-  if (parsed.ec != std::errc() || found == units.end() || number <= 0 || number > 10'000'000)
+  if (!number || found == units.end() || *number <= 0 || *number > 10'000'000)
     throw std::invalid_argument(
         fmt::format("\"{}\": write a time with its unit, such as 500ms, 2s or 1min, or off", text));
-  return milliseconds(number * found->second);
+  return milliseconds(*number * found->second);
 }
 
 Crate readCrate(const std::string& file) {

@@ -2,12 +2,12 @@
 #include "crate/config/write_crate.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sstream>
 #include <toml++/toml.h>
 
+#include "base/number.h"
 #include "crate/config/program_kinds.h"
 
 namespace mpf::crate {
@@ -27,11 +27,8 @@ std::string keyText(const std::string& key) {
 
 // A number is written without quotes.
 std::string valueText(const std::string& value) {
-  std::int64_t number = 0;
-  const auto* const end = value.data() + value.size();
-  const auto parsed = std::from_chars(value.data(), end, number);
-  const bool isNumber = parsed.ec == std::errc() && parsed.ptr == end;
-  return isNumber && fmt::to_string(number) == value ? value : tomlText(value);
+  const auto number = tryNumber<std::int64_t>(value);
+  return number && fmt::to_string(*number) == value ? value : tomlText(value);
 }
 
 // "a,0,,20" as { server = "a", first = 0, queue = 20 }.

@@ -3,11 +3,12 @@
 
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <fmt/format.h>
 #include <utility>
 
 #include <mpf/drivers/gpib/gpib_types.h>
+
+#include "base/number.h"
 
 namespace mpf {
 namespace {
@@ -124,11 +125,9 @@ void MeterModel::setTrigger(std::string_view argument) {
 
 void MeterModel::setRequestMask(std::string_view argument) {
   const bool hadCause = hasCause();
-  std::uint8_t mask = 0;
-  const auto* const end = argument.data() + argument.size();
-  const auto [rest, error] = std::from_chars(argument.data(), end, mask);
-  if (error != std::errc() || rest != end) return fail();
-  requestMask_ = mask;
+  const auto mask = tryNumber<std::uint8_t>(argument);
+  if (!mask) return fail();
+  requestMask_ = *mask;
   requestService(hadCause);
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/drivers/gpib/open_gpib_controller.h>
 
-#include <charconv>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <string>
@@ -10,6 +9,8 @@
 #include <mpf/drivers/gpib/prologix.h>
 #include <mpf/drivers/gpib/usbtmc.h>
 
+#include "base/number.h"
+
 namespace mpf {
 namespace {
 
@@ -17,12 +18,8 @@ constexpr std::string_view kForms =
     "prologix:HOST:PORT, prologix:/dev/ttyUSB0, usbtmc:/dev/usbtmc0, linux-gpib:0";
 
 int boardIn(const std::string& text) {
-  int board = -1;
-  const auto* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, board);
-  if (error != std::errc() || rest != end)
-    throw std::invalid_argument("the board is a number, such as 0 for /dev/gpib0");
-  return board;
+  if (const auto board = tryNumber<int>(text)) return *board;
+  throw std::invalid_argument("the board is a number, such as 0 for /dev/gpib0");
 }
 
 std::unique_ptr<GpibController> openKind(std::string_view kind, const std::string& device) {

@@ -2,7 +2,6 @@
 #include "drivers/gpib/prologix_controller.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/format.h>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include <mpf/drivers/serial/posix_terminal.h>
 #include <mpf/drivers/serial/tcp_serial_port.h>
 
+#include "base/number.h"
 #include "base/printable.h"
 #include "drivers/gpib/prologix_commands.h"
 
@@ -34,11 +34,8 @@ std::string_view textOf(std::span<const std::uint8_t> bytes) {
 
 // The number in the first line of an answer.
 std::optional<int> numberOf(std::string_view line) {
-  int number = 0;
-  const auto [rest, error] = std::from_chars(line.data(), line.data() + line.size(), number);
-  if (error != std::errc() || std::string_view(rest, line.data() + line.size()) != "\r\n")
-    return std::nullopt;
-  return number;
+  const auto number = tryTakeNumber<int>(line);
+  return line == "\r\n" ? number : std::nullopt;
 }
 
 PrologixLink::OpenPort portAt(const std::string& address) {

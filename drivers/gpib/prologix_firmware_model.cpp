@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <fmt/format.h>
 #include <utility>
 
 #include <mpf/clock.h>
 
+#include "base/number.h"
 #include "drivers/gpib/prologix_commands.h"
 
 namespace mpf {
@@ -18,13 +18,6 @@ constexpr std::chrono::milliseconds kLookEvery{1};  // at an instrument that is 
 constexpr std::size_t kMostUnsent = 4096;
 constexpr int kHighestPrimary = 30;
 constexpr std::size_t kPlusSigns = 2;
-
-std::optional<int> numberIn(std::string_view word) {
-  int number = 0;
-  const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  return error == std::errc() && rest == word.data() + word.size() ? std::optional(number)
-                                                                   : std::nullopt;
-}
 
 // Addresses in the form "22", "22 101".
 std::vector<GpibAddress> addressesIn(const std::vector<int>& words) {
@@ -81,7 +74,7 @@ void PrologixFirmwareModel::executeCommand(std::string_view text) {
     const auto word = text.substr(0, text.find(' '));
     text.remove_prefix(word.size());
     isReadEoi |= name == "read" && word == "eoi";
-    if (const auto number = numberIn(word)) words.push_back(*number);
+    if (const auto number = tryNumber<int>(word)) words.push_back(*number);
   }
   if (name == "read")
     return receive(isReadEoi, words.empty() ? std::nullopt : std::optional(words.front()));

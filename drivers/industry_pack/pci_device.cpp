@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
@@ -17,6 +16,8 @@
 #include <sstream>
 #include <stdexcept>
 #include <utility>
+
+#include "base/number.h"
 
 namespace mpf {
 namespace {
@@ -50,9 +51,7 @@ std::string orNone(const std::vector<std::string>& addresses) {
 
 std::string chooseByNumber(const PciKind& kind, const std::vector<std::string>& boards,
                            const std::string& number) {
-  auto n = boards.size();  // also when the number is too large for its type
-  std::from_chars(number.data(), number.data() + number.size(), n);
-  if (n < boards.size()) return boards[n];
+  if (const auto n = tryNumber<std::size_t>(number); n && *n < boards.size()) return boards[*n];
   throw std::runtime_error(
       boards.empty() ? fmt::format("this host has no {} (PCI id {})", kind.name,
                                    idText(kind.vendor, kind.device))

@@ -5,7 +5,6 @@
 #include <sys/eventfd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <system_error>
@@ -14,6 +13,7 @@
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 #include <mpf/real_time_priority.h>
 
+#include "base/number.h"
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
 #include "base/timespec.h"
@@ -47,12 +47,10 @@ Tpci200Options Tpci200Options::parse(const std::string& parameters) {
   if (comma == std::string::npos) return options;
   const auto rest = parameters.substr(comma + 1);
   if (!rest.starts_with(kPoll)) refuse(fmt::format("\"{}\" has no meaning", rest));
-  long microseconds = 0;
-  const auto* const end = rest.data() + rest.size();
-  const auto [stop, error] = std::from_chars(rest.data() + kPoll.size(), end, microseconds);
-  if (error != std::errc() || stop != end || microseconds < 1 || microseconds > 1'000'000)
+  const auto microseconds = tryNumber<long>(std::string_view(rest).substr(kPoll.size()));
+  if (!microseconds || *microseconds < 1 || *microseconds > 1'000'000)
     refuse(fmt::format("\"{}\": use 1 to 1000000 microseconds", rest));
-  options.pollEvery = std::chrono::microseconds(microseconds);
+  options.pollEvery = std::chrono::microseconds(*microseconds);
   return options;
 }
 

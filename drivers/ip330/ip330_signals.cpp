@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/ip330/ip330_signals.h"
 
-#include <charconv>
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
@@ -9,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/number.h"
 #include "drivers/ip330/ip330_settings.h"
 
 namespace mpf {
@@ -26,12 +26,8 @@ std::vector<std::string> split(std::string_view text, char separator) {
 
 template <class Number>
 Number parseNumber(const std::string& text) {
-  Number number{};
-  const auto* const end = text.data() + text.size();
-  const auto [at, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc() || at != end)
-    throw std::invalid_argument(fmt::format("\"{}\" is not a number", text));
-  return number;
+  if (const auto number = tryNumber<Number>(text)) return *number;
+  throw std::invalid_argument(fmt::format("\"{}\" is not a number", text));
 }
 
 Ip330Signal parseDc(const std::string& parameters) {

@@ -6,7 +6,6 @@
 //
 // Source  manual, "EXAMPLE Implementation: ip330Scan"; the EPICS module ip330.
 #include <aiRecord.h>
-#include <charconv>
 #include <cstring>
 #include <dbAccess.h>
 #include <errlog.h>
@@ -14,6 +13,8 @@
 
 #include <mpf/epics/dev_mpf.h>
 #include <mpf/ip330_commands.h>
+
+#include "base/number.h"
 
 namespace mpf {
 namespace {
@@ -25,9 +26,8 @@ class DevAiIp330Scan final : public DevMpf {
   explicit DevAiIp330Scan(aiRecord* record)
       : DevMpf(reinterpret_cast<dbCommon*>(record), &record->inp) {
     const std::string_view text = getUserParm();
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), gain_);
-    if (!text.empty() &&
-        (error != std::errc{} || end != text.data() + text.size() || gain_ < 0 || gain_ > 3)) {
+    gain_ = text.empty() ? 0 : tryNumber<int>(text).value_or(-1);
+    if (gain_ < 0 || gain_ > 3) {
       errlogPrintf("%s: INP: gain \"%s\": use 0, 1, 2 or 3\n", record->name, getUserParm());
       setStatus(S_db_badField);
       record->pact = TRUE;  // the record never processes

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,6 +10,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "base/number.h"
 
 namespace mpf {
 namespace {
@@ -23,27 +24,15 @@ constexpr double kMaxTimeoutS = 1e6;
   throw std::invalid_argument(fmt::format("{}={}: use {}", key, value, valid));
 }
 
-template <class Number>
-std::optional<Number> numberIn(std::string_view text) {
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
 // Decimal, or hexadecimal after 0x: from `low` to `high`.
 std::int64_t integerOf(std::string_view key, std::string_view text, std::int64_t low,
                        std::int64_t high) {
   std::optional<std::int64_t> number;
   if (text.starts_with("0x") || text.starts_with("0X")) {
-    const auto digits = text.substr(2);
-    std::uint32_t bits = 0;
-    const auto [end, error] =
-        std::from_chars(digits.data(), digits.data() + digits.size(), bits, 16);
-    if (error == std::errc{} && end == digits.data() + digits.size())
-      number = low < 0 ? std::int64_t{static_cast<std::int32_t>(bits)} : std::int64_t{bits};
+    if (const auto bits = tryNumber<std::uint32_t>(text.substr(2), 16))
+      number = low < 0 ? std::int64_t{static_cast<std::int32_t>(*bits)} : std::int64_t{*bits};
   } else {
-    number = numberIn<std::int64_t>(text);
+    number = tryNumber<std::int64_t>(text);
   }
   if (!number || *number < low || *number > high)
     refuse(key, text, fmt::format("an integer from {} to {}", low, high));
@@ -55,7 +44,7 @@ std::int32_t int32Of(std::string_view key, std::string_view text) {
 }
 
 double doubleOf(std::string_view key, std::string_view text) {
-  const auto number = numberIn<double>(text);
+  const auto number = tryNumber<double>(text);
   if (!number || !std::isfinite(*number)) refuse(key, text, "a number");
   return *number;
 }
@@ -82,7 +71,7 @@ constexpr std::array<std::pair<std::string_view, Mode>, 1> kOutputModes{{{"write
 constexpr std::array<std::pair<std::string_view, bool>, 2> kYesNo{{{"yes", true}, {"no", false}}};
 
 double timeoutOf(std::string_view key, std::string_view text) {
-  const auto seconds = numberIn<double>(text);
+  const auto seconds = tryNumber<double>(text);
   if (!seconds || !(*seconds >= 0 && *seconds <= kMaxTimeoutS))
     refuse(key, text, fmt::format("seconds from 0 (no limit) to {}", kMaxTimeoutS));
   return *seconds;
@@ -90,9 +79,9 @@ double timeoutOf(std::string_view key, std::string_view text) {
 
 LinkOptions::Range rangeOf(std::string_view key, std::string_view text) {
   const auto colon = text.find(':');
-  const auto low = numberIn<double>(text.substr(0, colon));
+  const auto low = tryNumber<double>(text.substr(0, colon));
   const auto high =
-      colon == std::string_view::npos ? std::nullopt : numberIn<double>(text.substr(colon + 1));
+      colon == std::string_view::npos ? std::nullopt : tryNumber<double>(text.substr(colon + 1));
   if (!low || !high || !std::isfinite(*high - *low) || *low == *high)
     refuse(key, text, "<low>:<high>, two different numbers");
   return {*low, *high};

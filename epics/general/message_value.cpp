@@ -2,11 +2,12 @@
 #include "epics/general/message_value.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 #include <epicsTypes.h>
 #include <fmt/format.h>
 #include <menuFtype.h>
+
+#include "base/number.h"
 
 namespace mpf {
 namespace {
@@ -38,9 +39,7 @@ std::string_view untilZero(std::string_view text) { return text.substr(0, text.f
 std::optional<double> numberAtStart(std::string_view text) {
   text = untilZero(text);
   text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n+"), text.size()));
-  double number = 0;
-  const auto result = std::from_chars(text.data(), text.data() + text.size(), number);
-  return result.ec == std::errc{} ? std::optional(number) : std::nullopt;
+  return tryTakeNumber<double>(text);
 }
 
 // Calls `act` with each element, until it returns false.

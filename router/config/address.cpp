@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstring>
 #include <fmt/format.h>
 #include <string_view>
 
+#include "base/number.h"
 #include "router/config/router_config.h"
 
 namespace mpf::router {
@@ -61,11 +61,9 @@ std::string checkedHost(const std::string& text, const std::string& host) {
 }
 
 std::uint16_t portOf(const std::string& text, std::string_view digits) {
-  std::uint16_t port = 0;
-  const auto [stopped, error] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
-  if (error != std::errc() || stopped != digits.data() + digits.size())
-    refuseAddress(text, "has no port from 0 to 65535 at its end");
-  return port;
+  const auto port = tryNumber<std::uint16_t>(digits);
+  if (!port) refuseAddress(text, "has no port from 0 to 65535 at its end");
+  return *port;
 }
 
 struct Ipv4Network {

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <fmt/format.h>
 #include <limits>
 
+#include "base/number.h"
 #include "shm/layout.h"
 
 namespace mpf::router {
@@ -25,16 +25,14 @@ constexpr std::array<Unit, 1> kCounts{{{"", 1}}};
 template <std::size_t count>
 std::uint64_t parseUnits(const std::string& text, const std::array<Unit, count>& units,
                          const char* how) {
-  std::uint64_t number = 0;
-  const auto* const end = text.data() + text.size();
-  const auto [stopped, error] = std::from_chars(text.data(), end, number);
-  const std::string_view rest(stopped, end);
+  std::string_view rest = text;
+  const auto number = tryTakeNumber<std::uint64_t>(rest);
   const auto* const unit = std::ranges::find(units, rest, &Unit::name);
-  if (error != std::errc() || unit == units.end() ||
-      number > std::numeric_limits<std::int64_t>::max() / unit->size) {
+  if (!number || unit == units.end() ||
+      *number > std::numeric_limits<std::int64_t>::max() / unit->size) {
     throw std::invalid_argument(fmt::format("\"{}\": write {}", text, how));
   }
-  return number * unit->size;
+  return *number * unit->size;
 }
 
 template <std::size_t count>

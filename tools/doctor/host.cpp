@@ -7,22 +7,16 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <fmt/format.h>
 #include <fstream>
 #include <sstream>
 
 #include <mpf/file_descriptor.h>
 
+#include "base/number.h"
+
 namespace mpf::tools {
 namespace {
-
-std::optional<std::uint64_t> tryNumber(const std::string& text) {
-  std::uint64_t value = 0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (failure != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 std::map<std::string, std::string> optionsOf(const std::string& text) {
   std::map<std::string, std::string> options;
@@ -90,14 +84,14 @@ std::optional<std::uint64_t> Host::limit(const std::string& name) const {
     std::istringstream words(line.substr(name.size()));
     std::string soft;
     words >> soft;
-    return soft == "unlimited" ? UINT64_MAX : tryNumber(soft);
+    return soft == "unlimited" ? UINT64_MAX : tryNumber<std::uint64_t>(soft);
   }
   return std::nullopt;
 }
 
 std::optional<std::uint64_t> Host::number(const std::string& path) const {
   const auto text = tryRead(path);
-  return text ? tryNumber(*text) : std::nullopt;
+  return text ? tryNumber<std::uint64_t>(*text) : std::nullopt;
 }
 
 std::optional<Host::Space> Host::spaceOfSharedMemory() {

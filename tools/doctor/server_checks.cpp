@@ -2,11 +2,11 @@
 // Check of running servers: whether they can accept more clients.
 #include <fcntl.h>
 
-#include <charconv>
 #include <fmt/format.h>
 
 #include <mpf/file_descriptor.h>
 
+#include "base/number.h"
 #include "shm/owner_lock.h"
 #include "shm/segment.h"
 #include "shm/segment_name.h"
@@ -34,7 +34,8 @@ OpenFiles openFilesOf(const Host& host, std::int32_t pid) {
   for (const auto& line : host.tryReadLines(fmt::format("proc/{}/limits", pid))) {
     const auto from = line.find_first_not_of(' ', kLine.size());
     if (!line.starts_with(kLine) || from == std::string::npos) continue;
-    std::from_chars(line.data() + from, line.data() + line.size(), files.limit);
+    auto limit = std::string_view(line).substr(from);
+    files.limit = tryTakeNumber<std::uint64_t>(limit).value_or(files.limit);
   }
   return files;
 }

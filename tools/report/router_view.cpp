@@ -7,12 +7,12 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <charconv>
 #include <fstream>
 
 #include <mpf/clock.h>
 #include <mpf/file_descriptor.h>
 
+#include "base/number.h"
 #include "base/printable.h"
 #include "shm/process.h"
 #include "shm/segment.h"
@@ -115,14 +115,12 @@ const char* toString(layout::RouterLineState state) noexcept {
 
 std::vector<std::int32_t> RouterLineView::locationList() const {
   std::vector<std::int32_t> list;
-  const char* at = locations.data();
-  const char* const end = at + locations.size();
-  while (at != end) {
-    std::int32_t number = 0;
-    const auto [next, error] = std::from_chars(at, end, number);
-    if (error == std::errc{} && (next == end || *next == ',')) list.push_back(number);
-    at = std::find_if_not(std::find(next, end, ','), end,
-                          [](char c) { return c == ',' || c == ' '; });
+  std::string_view rest = locations;
+  while (!rest.empty()) {
+    const auto number = tryTakeNumber<std::int32_t>(rest);
+    if (number && (rest.empty() || rest.starts_with(','))) list.push_back(*number);
+    rest.remove_prefix(std::min(rest.find(','), rest.size()));
+    rest.remove_prefix(std::min(rest.find_first_not_of(", "), rest.size()));
   }
   return list;
 }

@@ -3,13 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <fmt/format.h>
 #include <memory>
 
 #include <mpf/backplane.h>
 
 #include "base/command_line.h"
+#include "base/number.h"
 #include "base/print_error.h"
 #include "base/stop_signals.h"
 #include "tools/arguments.h"
@@ -35,12 +35,9 @@ constexpr std::size_t kFewestDigits = 8;
 constexpr int kShortPauses = 32;  // ratio of the longest pause to the shortest
 
 std::uint64_t linkNumber(const std::string& digits) {
-  std::uint64_t number = 0;
-  const auto* const end = digits.data() + digits.size();
   if (digits.empty()) return 0;
-  if (const auto [at, failure] = std::from_chars(digits.data(), end, number, 16);
-      failure == std::errc{} && at == end && digits.size() >= kFewestDigits)
-    return number;
+  const auto number = tryNumber<std::uint64_t>(digits, 16);
+  if (number && digits.size() >= kFewestDigits) return *number;
   throw std::invalid_argument(fmt::format(
       "tap: \"{}\" is not a link: use its hexadecimal number, as tap and inspect show it", digits));
 }

@@ -3,8 +3,9 @@
 
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <fmt/format.h>
+
+#include "base/number.h"
 
 namespace mpf::startup {
 namespace {
@@ -109,20 +110,19 @@ void Lexer::readNumber() {
   const std::string_view suffixes = isReal ? "fFlL" : "uUlL";
   while (digits.size() > 1 && suffixes.find(digits.back()) != std::string_view::npos)
     digits.remove_suffix(1);
-  const auto* const end = digits.data() + digits.size();
-  std::from_chars_result result{};
+  const auto valueOf = [&](const auto& number) {
+    if (!number) throw LineError{begin + 1, fmt::format("{} is not a number", written)};
+    return *number;
+  };
   if (isReal) {
     token_.kind = Token::Kind::real;
-    result = std::from_chars(digits.data(), end, token_.real);
+    token_.real = valueOf(tryNumber<double>(digits));
   } else {
     token_.kind = Token::Kind::integer;
     const int base = isHex ? 16 : digits.size() > 1 && digits.front() == '0' ? 8 : 10;
-    std::uint64_t value = 0;
-    result = std::from_chars(digits.data() + (isHex ? 2 : 0), end, value, base);
-    token_.integer = static_cast<std::int64_t>(value);
+    digits.remove_prefix(isHex ? 2 : 0);
+    token_.integer = static_cast<std::int64_t>(valueOf(tryNumber<std::uint64_t>(digits, base)));
   }
-  if (result.ec != std::errc() || result.ptr != end)
-    throw LineError{begin + 1, fmt::format("{} is not a number", written)};
 }
 
 char Lexer::readEscape() {

@@ -2,8 +2,9 @@
 #include "crate/startup/shell/value.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/format.h>
+
+#include "base/number.h"
 
 namespace mpf::startup {
 namespace {
@@ -19,22 +20,15 @@ std::optional<std::int64_t> wholeInteger(const std::string& word) {
     base = isHex ? 16 : 8;
     begin = sign + (isHex ? 2 : 1);
   }
-  std::uint64_t magnitude = 0;
-  const auto* const end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(word.data() + begin, end, magnitude, base);
-  if (error != std::errc() || stop != end) return std::nullopt;
-  return static_cast<std::int64_t>(isNegative ? 0 - magnitude : magnitude);
+  const auto magnitude = tryNumber<std::uint64_t>(std::string_view(word).substr(begin), base);
+  if (!magnitude) return std::nullopt;
+  return static_cast<std::int64_t>(isNegative ? 0 - *magnitude : *magnitude);
 }
 
 std::optional<double> wholeReal(const std::string& word) {
-  const std::size_t begin = word.starts_with('+') ? 1 : 0;
-  double real = 0;
-  const auto* const end = word.data() + word.size();
-  const auto [stop, error] = std::from_chars(word.data() + begin, end, real);
   // "nan" and "inf" are names.
-  const bool isNumber = word.find_first_of("0123456789") != std::string::npos;
-  if (error != std::errc() || stop != end || !isNumber) return std::nullopt;
-  return real;
+  if (word.find_first_of("0123456789") == std::string::npos) return std::nullopt;
+  return tryNumber<double>(std::string_view(word).substr(word.starts_with('+') ? 1 : 0));
 }
 
 }  // namespace

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <fmt/format.h>
 #include <stdexcept>
+
+#include "base/number.h"
 
 namespace mpf {
 namespace {
@@ -24,21 +25,15 @@ std::string upToComma(std::string_view text) { return std::string(text.substr(0,
 // As atoi(), which the original used: leading blanks are skipped, no number is 0.
 std::int32_t numberOf(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(" \t+"), text.size()));
-  std::int32_t number = 0;
-  std::from_chars(text.data(), text.data() + text.size(), number);
-  return number;
+  return tryTakeNumber<std::int32_t>(text).value_or(0);
 }
 
 std::string bytesOf(std::string_view hex) {
-  const auto isDigit = [&hex](std::size_t at) {
-    return at < hex.size() && std::isxdigit(static_cast<unsigned char>(hex[at])) != 0;
-  };
   std::string bytes;
-  while (bytes.size() < kMaxTerminator && isDigit(0) && isDigit(1)) {
-    unsigned char byte = 0;
-    std::from_chars(hex.data(), hex.data() + 2, byte, 16);
-    bytes.push_back(static_cast<char>(byte));
-    hex.remove_prefix(2);
+  for (; bytes.size() < kMaxTerminator && hex.size() >= 2; hex.remove_prefix(2)) {
+    const auto byte = tryNumber<unsigned char>(hex.substr(0, 2), 16);
+    if (!byte) break;
+    bytes.push_back(static_cast<char>(*byte));
   }
   return bytes;
 }

@@ -3,10 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <fmt/format.h>
 #include <utility>
 
+#include "base/number.h"
 #include "shm/link.h"
 
 namespace mpf {
@@ -33,12 +33,9 @@ std::string OptionFields::word(const char* what, std::string_view otherwise) {
 
 int OptionFields::number(const char* what) {
   const auto text = word(what);
-  int value = 0;
-  const auto* const end = text.data() + text.size();
-  const auto [last, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || last != end)
-    complain(fmt::format("{} \"{}\" is not a whole number", what, text));
-  return value;
+  const auto value = tryNumber<int>(text);
+  if (!value) complain(fmt::format("{} \"{}\" is not a whole number", what, text));
+  return *value;
 }
 
 int OptionFields::number(const char* what, int otherwise) {

@@ -3,9 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <fmt/format.h>
 #include <vector>
+
+#include "base/number.h"
 
 namespace mpf {
 
@@ -22,16 +23,13 @@ void InputWires::addTo(CLI::App& app, int highest) {
 }
 
 void InputWires::add(const std::string& text, int highest) {
-  int bit = -1;
   const auto equals = text.find('=');
-  const auto* const end = text.data() + std::min(equals, text.size());
-  const auto [rest, error] = std::from_chars(text.data(), end, bit);
-  if (equals == std::string::npos || error != std::errc() || rest != end || bit < 0 ||
-      bit > highest)
+  const auto bit = tryNumber<int>(std::string_view(text).substr(0, equals));
+  if (equals == std::string::npos || !bit || *bit < 0 || *bit > highest)
     throw CLI::ValidationError(
         "--input", fmt::format("\"{}\" does not have the form BIT=WIRE with a bit from 0 to {}",
                                text, highest));
-  wires_[bit] = text.substr(equals + 1);
+  wires_[*bit] = text.substr(equals + 1);
 }
 
 std::function<void(int, double)> wireOutputs(ModelWires* wires, const std::string& module,
