@@ -1,44 +1,31 @@
 // SPDX-License-Identifier: MIT
 #include "shm/process.h"
 
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <string_view>
 
 #include "base/number.h"
+#include "base/process_stat.h"
 #include "shm/fork_guard.h"
 
 namespace mpf {
 namespace {
 
-// Field 22 of /proc/<pid>/stat. The program name in field 2 may contain blanks and brackets.
-// Returns 0 if the file cannot be read.
-std::uint64_t startTicksIn(const char* path) {
-  const FileDescriptor file(::open(path, O_RDONLY | O_CLOEXEC));
-  std::array<char, 1024> text;
-  const auto got = file ? ::read(file.get(), text.data(), text.size()) : -1;
-  if (got <= 0) return 0;
-  std::string_view fields(text.data(), static_cast<std::size_t>(got));
-  fields.remove_prefix(std::min(fields.rfind(')'), fields.size()));
-  for (int field = 2; field < 22; ++field)
-    fields.remove_prefix(std::min(fields.find(' ') + 1, fields.size()));
-  return tryTakeNumber<std::uint64_t>(fields).value_or(0);
+std::uint64_t startTicksIn(const std::optional<ProcessStat>& stat) noexcept {
+  return stat ? stat->number(ProcessStat::kStartTicks) : 0;
 }
 
 // Start time of a process as /proc shows it, which may belong to another pid namespace. Returns 0
 // if it cannot be read.
-std::uint64_t startTicksOf(std::int32_t pid) {
-  std::array<char, 32> path{};
-  std::snprintf(path.data(), path.size(), "/proc/%d/stat", pid);
-  return startTicksIn(path.data());
+std::uint64_t startTicksOf(std::int32_t pid) noexcept {
+  return startTicksIn(ProcessStat::tryRead(pid));
 }
 
 // Whether /proc shows the processes of our pid namespace.
@@ -99,7 +86,7 @@ const Process& Process::self() noexcept {
                        self.pidNamespace != 0;  // 0: /proc could not be read
   if (isKnown) return self;
   fork = ForkGuard();
-  self = {::getpid(), ::getuid(), startTicksIn("/proc/self/stat"), ownPidNamespace(), {}};
+  self = {::getpid(), ::getuid(), startTicksIn(ProcessStat::tryReadOwn()), ownPidNamespace(), {}};
   const std::string_view name = ::program_invocation_short_name;
   name.copy(self.program.data(), self.program.size() - 1);
   return self;

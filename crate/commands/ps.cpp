@@ -9,10 +9,10 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <memory>
-#include <sstream>
 
 #include "base/duration_text.h"
 #include "base/printable.h"
+#include "base/process_stat.h"
 #include "base/system_call.h"
 #include "base/whole_file.h"
 #include "crate/commands/commands.h"
@@ -31,15 +31,9 @@ using tools::Table;
 // Processor time [s] and resident memory [bytes] of a process; zeros when it has ended.
 void addUse(json& process) {
   const auto pid = process.value("pid", 0);
-  std::ifstream stat(fmt::format("/proc/{}/stat", pid));
-  std::string text;
-  std::getline(stat, text);
-  std::istringstream fields(text.substr(text.rfind(')') + 1));
-  std::string field;
-  double ticks = 0;
-  for (int number = 3; number <= 15 && fields >> field; ++number)
-    if (number >= 14) ticks += std::strtod(field.c_str(), nullptr);
-  process["cpuS"] = ticks / static_cast<double>(::sysconf(_SC_CLK_TCK));
+  const auto stat = ProcessStat::tryRead(pid).value_or(ProcessStat());
+  const auto ticks = stat.number(ProcessStat::kUserTicks) + stat.number(ProcessStat::kSystemTicks);
+  process["cpuS"] = static_cast<double>(ticks) / static_cast<double>(::sysconf(_SC_CLK_TCK));
   std::ifstream memory(fmt::format("/proc/{}/statm", pid));
   std::uint64_t size = 0, resident = 0;
   memory >> size >> resident;

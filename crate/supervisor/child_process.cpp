@@ -10,15 +10,14 @@
 #include <cerrno>
 #include <cstring>
 #include <fmt/format.h>
-#include <fstream>
 #include <grp.h>
 #include <pwd.h>
-#include <sstream>
 #include <stdexcept>
 #include <vector>
 
 #include <mpf/clock.h>
 
+#include "base/process_stat.h"
 #include "base/system_call.h"
 
 namespace mpf::crate {
@@ -140,22 +139,8 @@ void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number) {
 }
 
 std::uint64_t startTicksOf(pid_t pid) {
-  std::ifstream file(fmt::format("/proc/{}/stat", pid));
-  std::string text;
-  std::getline(file, text);
-  const auto afterName = text.rfind(')');
-  if (afterName == std::string::npos) return 0;
-  std::istringstream fields(text.substr(afterName + 1));
-  std::string state;
-  fields >> state;
-  if (state == "Z" || state == "X") return 0;
-  std::uint64_t ticks = 0;
-  for (int field = 4; field <= 22; ++field) {
-    std::string value;
-    fields >> value;
-    if (field == 22) ticks = std::strtoull(value.c_str(), nullptr, 10);
-  }
-  return ticks;
+  const auto stat = ProcessStat::tryRead(pid);
+  return stat && !stat->hasEnded() ? stat->number(ProcessStat::kStartTicks) : 0;
 }
 
 std::int64_t startNsOf(std::uint64_t startTicks) {

@@ -6,14 +6,13 @@
 #include <sys/wait.h>
 
 #include <filesystem>
-#include <fstream>
 #include <gtest/gtest.h>
 #include <optional>
-#include <sstream>
 #include <string>
 
 #include <mpf/message_client.h>
 
+#include "base/process_stat.h"
 #include "crate/capsule/capsule.h"
 #include "crate/capsule/segment_witness.h"
 #include "tests/support/temporary_folder.h"
@@ -24,15 +23,8 @@
 
 namespace mpf::crate::test {
 
-// Field 22 of /proc/<pid>/stat.
 inline std::uint64_t startTicksOfVictim(pid_t pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  std::string text;
-  std::getline(file, text);
-  std::istringstream fields(text.substr(text.rfind(')') + 1));
-  std::string field;
-  for (int number = 3; number <= 22; ++number) fields >> field;
-  return std::stoull(field);
+  return ProcessStat::tryRead(pid)->number(ProcessStat::kStartTicks);
 }
 
 class CrashTest : public testing::Test {

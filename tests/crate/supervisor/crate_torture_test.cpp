@@ -17,6 +17,7 @@
 
 #include <mpf/sync_client.h>
 
+#include "base/process_stat.h"
 #include "tests/crate/supervisor/supervisor_fixture.h"
 #include "tests/support/router_pair.h"
 
@@ -172,9 +173,8 @@ PVXS_QSRV_ENABLE = "NO"
     }
   }
   static bool isAlive(pid_t pid) {
-    const auto text = readOfProcess(pid, "stat");
-    const auto name = text.rfind(')');
-    return name != std::string::npos && text[name + 2] != 'Z' && text[name + 2] != 'X';
+    const auto stat = ProcessStat::tryRead(pid);
+    return stat && !stat->hasEnded();
   }
 
   std::vector<std::string> names_{"supervisor", "one", "two", "three", "dac", "near", "far"};

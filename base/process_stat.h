@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// ProcessStat: what /proc/<pid>/stat says about a process. proc(5) lists the fields.
+//
+// Threads  any; it allocates nothing.
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace mpf {
+
+class ProcessStat {
+ public:
+  // Fields of proc(5).
+  static constexpr int kUserTicks = 14;
+  static constexpr int kSystemTicks = 15;
+  static constexpr int kStartTicks = 22;
+
+  // nullopt when there is no such process, or /proc does not show it.
+  static std::optional<ProcessStat> tryRead(pid_t pid) noexcept;
+  // This process, also where /proc belongs to another pid namespace.
+  static std::optional<ProcessStat> tryReadOwn() noexcept;
+
+  // A zombie, or a process that is being removed.
+  [[nodiscard]] bool hasEnded() const noexcept;
+  // A field from 4 on; 0 when the file does not have it.
+  [[nodiscard]] std::uint64_t number(int field) const noexcept;
+
+ private:
+  static std::optional<ProcessStat> tryReadFile(const char* path) noexcept;
+  [[nodiscard]] std::string_view from(int field) const noexcept;
+
+  std::array<char, 1024> text_{};
+  std::size_t length_ = 0;
+};
+
+}  // namespace mpf
