@@ -15,6 +15,7 @@
 #include "shm/handling.h"
 #include "shm/histogram.h"
 #include "shm/segment_name.h"
+#include "shm/shortage.h"
 
 namespace mpf {
 namespace {
@@ -142,30 +143,12 @@ void Connector::closeLink(RequestSender& sender) {
   endpoint.peers().release(std::move(server));
 }
 
-// The shortage at the server that keeps it from accepting the client; empty when it reports none.
-std::string Connector::shortageAt(const layout::WindowControl& server) const {
-  switch (server.shortage.load(std::memory_order_relaxed)) {
-    case layout::Shortage::descriptors:
-      return fmt::format(
-          "server \"{}\" cannot accept the client: its process has no file descriptor left; "
-          "restart it with a higher limit (ulimit -n)",
-          server_);
-    case layout::Shortage::openFiles:
-      return fmt::format(
-          "server \"{}\" cannot accept the client: its host has the maximum number of open files; "
-          "raise fs.file-max",
-          server_);
-    case layout::Shortage::memory:
-      return fmt::format("server \"{}\" cannot accept the client: it has no memory left", server_);
-    default:
-      return {};
-  }
-}
-
 // A server does not accept clients while it handles a request.
 std::string Connector::notAcceptedBecause(const PeerWindow& server) const {
   const auto& control = server.control();
-  if (auto shortage = shortageAt(control); !shortage.empty()) return shortage;
+  const auto [lack, remedy] = textOf(control.shortage.load(std::memory_order_relaxed));
+  if (*lack != '\0')
+    return fmt::format("server \"{}\" cannot accept the client: {}; {}", server_, lack, remedy);
   const auto handling = Handling::of(control.handling.load(std::memory_order_relaxed));
   const auto sinceNs =
       static_cast<std::int64_t>(control.progressAtNs.load(std::memory_order_relaxed));

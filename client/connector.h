@@ -64,7 +64,6 @@ class Connector {
  private:
   void publishPendingBind();
   [[nodiscard]] std::string notAcceptedBecause(const PeerWindow& server) const;
-  [[nodiscard]] std::string shortageAt(const layout::WindowControl& server) const;
 
   DispatcherParts& parts_;
   BindingTimer& timer_;

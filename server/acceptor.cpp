@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "server/acceptor.h"
 
-#include <cerrno>
 #include <cstddef>
-#include <new>
-#include <system_error>
+#include <fmt/format.h>
 #include <utility>
 
 #include "shm/histogram.h"
 #include "shm/segment_name.h"
+#include "shm/shortage.h"
 #include "shm/stale_segments.h"
 
 namespace mpf {
@@ -16,22 +15,6 @@ namespace {
 
 constexpr std::size_t kMaxLinksPerRescan = 1024;
 constexpr std::int64_t kRestAfterRescan = 9;  // times the duration of the rescan
-
-// The shortage of this process or host that made an operation fail, if `error` says so.
-layout::Shortage shortageOf(const std::exception& error) {
-  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return layout::Shortage::memory;
-  const auto* failed = dynamic_cast<const std::system_error*>(&error);
-  switch (failed != nullptr ? failed->code().value() : 0) {
-    case EMFILE:
-      return layout::Shortage::descriptors;
-    case ENFILE:
-      return layout::Shortage::openFiles;
-    case ENOMEM:
-      return layout::Shortage::memory;
-    default:
-      return layout::Shortage::none;
-  }
-}
 
 }  // namespace
 
@@ -129,7 +112,8 @@ void Acceptor::noteShortage(layout::Shortage shortage, const std::string& why) {
   const bool isOver = shortage == layout::Shortage::none;
   if (!isOver && was == layout::Shortage::none)
     control.alarms.fetch_add(1, std::memory_order_relaxed);
-  if (onShortage_) onShortage_(isOver ? std::string() : why);
+  if (onShortage_)
+    onShortage_(isOver ? std::string() : fmt::format("{}; {}", why, textOf(shortage).remedy));
 }
 
 }  // namespace mpf

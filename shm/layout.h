@@ -143,7 +143,13 @@ static_assert(sizeof(Histogram) == sizeof(std::uint64_t) * (kHistogramBuckets + 
 enum class WindowState : std::uint32_t { open = 1, closed = 2 };
 enum class SleepState : std::uint32_t { awake = 0, onFutex = 1, onDescriptor = 2 };
 // What a server lacks to accept another client.
-enum class Shortage : std::uint32_t { none = 0, descriptors = 1, openFiles = 2, memory = 3 };
+enum class Shortage : std::uint32_t {
+  none = 0,
+  descriptors = 1,
+  openFiles = 2,
+  memory = 3,
+  threads = 4
+};
 
 // State, counters and histograms of a window's owner, at offset 512 of a server or client window.
 // Every word is written by the owner.

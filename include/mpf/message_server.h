@@ -269,10 +269,10 @@ class MessageServer {
 
   // --- operation
 
-  // Sets a callback for a shortage: receive() calls it with the reason when this process can accept
-  // no more clients because it has no file descriptors or memory left, and with an empty text when
-  // it can again. Each shortage also counts as an alarm. Set it before the first receive(). It must
-  // not throw.
+  // Sets a callback for a shortage: receive() calls it with the reason and a remedy when this
+  // process can accept no more clients because it has no file descriptors or memory left, and with
+  // an empty text when it can again. Each shortage also counts as an alarm. Set it before the first
+  // receive(). It must not throw.
   void onShortage(std::function<void(const std::string& why)> callback);
 
   // Counts one fault of the hardware that the server drives; `mpf msr` shows the number. Any

@@ -1,25 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "router/outgoing/pending_binds.h"
 
-#include <cerrno>
 #include <exception>
-#include <system_error>
 
 #include "shm/segment.h"
 #include "shm/segment_name.h"
+#include "shm/shortage.h"
 
 namespace mpf::router {
-namespace {
-
-// Whether a resource is exhausted that may be available again in a while.
-bool isResourceExhaustion(const std::exception& error) noexcept {
-  const auto* const failure = dynamic_cast<const std::system_error*>(&error);
-  const auto code = failure != nullptr ? failure->code().value() : 0;
-  return code == EMFILE || code == ENFILE || code == ENOMEM;
-}
-
-}  // namespace
-
 std::set<ServerName> PendingBinds::look() {
   const auto& backplane = backplane_.name();
   std::map<std::string, Known> known;
@@ -35,8 +23,9 @@ std::set<ServerName> PendingBinds::look() {
         known[name] = {{header->location, segments::rawText(header->name)}, header->ownerWindow};
       }
     } catch (const std::exception& error) {
-      // A segment that is invalid or that we may not read names no server.
-      if (isResourceExhaustion(error)) problem_ = error.what();
+      // A segment that is invalid or that we may not read names no server. Without resources, it is
+      // read later.
+      if (shortageOf(error) != layout::Shortage::none) problem_ = error.what();
       else known[name] = {};
     }
   }

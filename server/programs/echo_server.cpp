@@ -33,7 +33,7 @@ int serve(int argc, char** argv, const EchoServer& echo) {
 
   const ServerLog log(echo.program, arguments.logLevel);
   MessageServer server(Backplane::attach(arguments.backplane), name, arguments.messages);
-  logShortages(server, log);
+  logShortages(server, *log);
   echo.answer(server);
   log->info(R"(serving "{}" at location {})", name, server.location());
   const auto status = server.runUntilSignal();

@@ -129,11 +129,10 @@ ServerLog::~ServerLog() {
   writer_->finish();
 }
 
-void logShortages(MessageServer& server, const ServerLog& log) {
-  server.onShortage([&log, name = server.getName()](const std::string& why) {
-    if (why.empty()) return log->info(R"("{}" accepts clients again)", name);
-    log->warn(R"("{}" cannot accept another client: {}; start it with higher limits (ulimit -n))",
-              name, why);
+void logShortages(MessageServer& server, const Log& log) {
+  server.onShortage([log, name = server.getName()](const std::string& why) {
+    if (why.empty()) log.info(R"("{}" accepts clients again)", name);
+    else log.warn(R"("{}" cannot accept another client: {})", name, why);
   });
 }
 

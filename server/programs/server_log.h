@@ -44,7 +44,6 @@ class MessageServer;
 
 // Logs when `server` cannot accept clients because it has no file descriptors or memory left, and
 // when it can again.
-//   log  outlives the server
-void logShortages(MessageServer& server, const ServerLog& log);
+void logShortages(MessageServer& server, const Log& log);
 
 }  // namespace mpf

@@ -13,6 +13,7 @@ namespace mpf::test {
 namespace {
 
 using layout::LinkState;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -104,7 +105,7 @@ TEST_F(AcceptorTest, AShortageIsOneAlarmUntilAClientIsAccepted) {
   EXPECT_EQ(valueOf(control().alarms), 1u);
   accept(link);
 
-  EXPECT_THAT(reports, ElementsAre(HasSubstr("open files"), ""));
+  EXPECT_THAT(reports, ElementsAre(AllOf(HasSubstr("open files"), HasSubstr("ulimit -n")), ""));
   EXPECT_EQ(control().shortage.load(std::memory_order_relaxed), layout::Shortage::none);
   EXPECT_EQ(valueOf(control().protocolErrors), 0u);
 }

@@ -10,12 +10,15 @@
 #include "shm/owner_lock.h"
 #include "shm/segment.h"
 #include "shm/segment_name.h"
+#include "shm/shortage.h"
 #include "tools/doctor/checks.h"
 #include "tools/inspect/segment_image.h"
 #include "tools/text/wrap.h"
 
 namespace mpf::tools {
 namespace {
+
+constexpr std::uint64_t kFilesOfAClient = 3;  // at most, while the server accepts it
 
 struct OpenFiles {
   std::uint64_t used = 0, limit = 0;
@@ -40,9 +43,6 @@ OpenFiles openFilesOf(const Host& host, std::int32_t pid) {
   return files;
 }
 
-constexpr const char* kMoreFiles =
-    "start the server with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the systemd unit";
-
 struct Problem {
   std::string seen, remedy;
 };
@@ -51,22 +51,17 @@ struct Problem {
 std::optional<Problem> tryProblemOf(const Host& host, const layout::SegmentHeader& header,
                                     const layout::WindowControl& control) {
   const auto server = fmt::format("\"{}\" (pid {})", segments::text(header.name), header.ownerPid);
-  switch (control.shortage.load(std::memory_order_relaxed)) {
-    case layout::Shortage::descriptors:
-      return Problem{server + " refuses clients: no file descriptor is left", kMoreFiles};
-    case layout::Shortage::openFiles:
-      return Problem{server + " refuses clients: the host has no open file left",
-                     "sysctl fs.file-max=N, with a larger N than now"};
-    case layout::Shortage::memory:
-      return Problem{server + " refuses clients: no memory is left",
-                     "end programs that use much memory, or add memory"};
-    default:
-      break;
-  }
+  const auto shortage = control.shortage.load(std::memory_order_relaxed);
+  const auto [lack, remedy] = textOf(shortage);
   const auto files = openFilesOf(host, header.ownerPid);
+  // A shortage is over when the next client is accepted, which may never come.
+  const bool isOver = shortage == layout::Shortage::descriptors && files.used != 0 &&
+                      files.used + kFilesOfAClient < files.limit;
+  if (*lack != '\0' && !isOver)
+    return Problem{fmt::format("{} refuses clients: {}", server, lack), remedy};
   if (!files.isNearlyFull()) return std::nullopt;
   return Problem{fmt::format("{} has {} of {} files open", server, files.used, files.limit),
-                 kMoreFiles};
+                 textOf(layout::Shortage::descriptors).remedy};
 }
 
 // A server window whose owner is alive; nullopt when the file is something else or this user may

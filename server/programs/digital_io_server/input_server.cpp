@@ -22,7 +22,7 @@ DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::st
   answerOtherTypes<Int32>(server_, [this](MessageType type) {
     log_->debug("inputs: a request of type {}: status -1", toString(type));
   });
-  logShortages(server_, log_);
+  logShortages(server_, *log_);
   subscription_ = io.subscribe([this](const DigitalIoChange& change) { enqueue(change); });
   thread_.start(log, [this] { run(); }, std::move(failed));
 }

@@ -71,7 +71,7 @@ int serve(int argc, char** argv) {
   };
   const mpf::StopSignals signals(stop,
                                  &server);  // before the first reply: a client may stop us then
-  mpf::logShortages(server, log);
+  mpf::logShortages(server, *log);
   const mpf::DigitalOutputServer outputs(server, io, log);
   mpf::ProgramFailure failure;
   const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log,

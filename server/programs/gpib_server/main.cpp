@@ -27,7 +27,7 @@ int serve(int argc, char** argv) {
   if (!bus) return 0;
   const auto backplane = mpf::Backplane::attach(arguments.backplane);
   mpf::MessageServer server(backplane, options.server, arguments.messages);
-  mpf::logShortages(server, log);
+  mpf::logShortages(server, *log);
   mpf::GpibServer served(server, *bus, options.limits, log);
   mpf::SniffServer sniff(backplane, options.server, arguments.messages, mpf::sniffSourceOf(*bus),
                          log, kSniffBatching);

@@ -143,7 +143,7 @@ void Hardware::plugModel(const ModulePlace& place, const MakeModel& makeModel) {
 }
 
 int runServer(MessageServer& server, const IndustryPackModule& module, const ServerLog& log) {
-  logShortages(server, log);
+  logShortages(server, *log);
   log->info(R"(serving the {} at {} as "{}" at location {})", module.kind().name, module.where(),
             server.getName(), server.location());
   const auto status = server.runUntilSignal();

@@ -59,7 +59,7 @@ Ip330Servers::Unit& Ip330Servers::addUnit(const std::string& name, int queueSize
   options.queueSize = queueSize;
   auto unit = std::make_unique<Unit>();
   unit->server = std::make_unique<MessageServer>(backplane_, name, options);
-  logShortages(*unit->server, log_);
+  logShortages(*unit->server, *log_);
   units_.push_back(std::move(unit));
   const std::lock_guard lock(mutex_);
   alarmed_.push_back(units_.back()->server.get());

@@ -31,7 +31,7 @@ ServedPort::ServedPort(const Backplane& backplane, const SerialStartOptions& opt
       server_(backplane, start.server, messagesOf(options, start)),
       serial_(server_, port, start.serial, log_),
       sniff_(backplane, start.server, messagesOf(options, start), sniffSourceOf(port), log_) {
-  logShortages(server_, log_);
+  logShortages(server_, *log_);
   port.onStateChange([this](SerialPortState state, const std::string& because) {
     if (state == SerialPortState::plugged) return log_->info("the line is connected");
     log_->warn("the line is lost: {}", because);

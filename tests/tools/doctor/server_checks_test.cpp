@@ -56,9 +56,20 @@ TEST_F(ServerChecks, AServerThatRefusesClientsIsAProblem) {
     expect(checkServers(host_), Health::problem, server + reason, remedy);
   };
 
-  check(layout::Shortage::descriptors, "no file descriptor is left", "LimitNOFILE");
+  check(layout::Shortage::descriptors, "its process has no file descriptor left", "LimitNOFILE");
   check(layout::Shortage::openFiles, "the host has no open file left", "fs.file-max");
   check(layout::Shortage::memory, "no memory is left", "end programs");
+  check(layout::Shortage::threads, "its process can start no thread", "ulimit -u");
+}
+
+// The server says so until it accepts the next client.
+TEST_F(ServerChecks, AServerWhoseClientsHaveGoneRefusesNoMore) {
+  const auto lock = copyServer(dac_, layout::Shortage::descriptors);
+
+  openFiles(14, "16");
+  expect(checkServers(host_), Health::problem, "no file descriptor left", "LimitNOFILE");
+  openFiles(11, "16");
+  expect(checkServers(host_), Health::ok, "1 server");
 }
 
 TEST_F(ServerChecks, AServerWithNearlyAllFilesOpenIsAProblem) {
