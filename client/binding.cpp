@@ -6,6 +6,7 @@
 #include "base/step.h"
 #include "shm/histogram.h"
 #include "shm/segment_name.h"
+#include "shm/shortage.h"
 
 namespace mpf {
 namespace {
@@ -45,6 +46,7 @@ void Binding::setValueHandler(ValueHandler handler) {
 void Binding::tryConnect() try {
   // Another thread in bind(), or a callback that ran the dispatcher, may have connected already.
   if (!isWaiting()) return;
+  lacksResources_ = false;
   const auto server = connector_.tryFindServer();
   if (!server || !connector_.tryOpenLink(server, sender_)) return;
   setState(BindingState::connecting);
@@ -53,6 +55,7 @@ void Binding::tryConnect() try {
   timer_.wakeAt(nudgeInterval_.dueNs());
 } catch (const std::exception& error) {
   // No memory, no permission, a window of another version: report the reason and try again later.
+  lacksResources_ = shortageOf(error) != layout::Shortage::none;
   connector_.setReason(error.what());
   connector_.retryLater();
 }

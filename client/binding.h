@@ -100,6 +100,8 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
     return state_.load(std::memory_order_acquire) == BindingState::waiting;
   }
   [[nodiscard]] bool hasDeadPeer() const noexcept;
+  // Whether the last call of tryConnect() failed because of a shortage.
+  [[nodiscard]] bool lacksResources() const noexcept { return lacksResources_; }
 
  private:
   // The pause before requests are sent again that found no room at the server.
@@ -182,6 +184,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   Connector connector_{parts_, timer_};
   NudgeInterval nudgeInterval_;
   bool isPaused_ = false;
+  bool lacksResources_ = false;
   ValueHandler values_;  // written before bind()
   RunReceiver* runs_ = nullptr;  // likewise; nullptr: all replies are delivered one by one
   // Messages of a run, without its first one, that takeSome() has still to count.

@@ -17,6 +17,8 @@ std::size_t RelayClient::sendAs(const MessageRun& run) noexcept {
 
 void RelayClient::setRunReceiver(RunReceiver& receiver) { binding_->setRunReceiver(receiver); }
 
+bool RelayClient::lacksResources() const noexcept { return binding_->lacksResources(); }
+
 void RelayClient::pause() { binding_->pause(); }
 void RelayClient::resume() { binding_->resume(); }
 

@@ -26,6 +26,9 @@ class RelayClient : public MessageClient {
   // on, a further reply before the first one ends the link as a protocol error. Call it before
   // bind(), once.
   void setRunReceiver(RunReceiver& receiver);
+  // Whether the last attempt to connect failed because this process or its host lacks descriptors,
+  // memory or threads. The client tries again.
+  [[nodiscard]] bool lacksResources() const noexcept;
   // Whether a message that the callback received ended its request.
   [[nodiscard]] static bool endsRequest(const Message& message) noexcept {
     return (message.route().flags & kEndsRequest) != 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <stdexcept>
 #include <utility>
 
 #include "router/transport/kj_text.h"
@@ -17,6 +18,11 @@ FarClient::FarClient(const Shared& shared, const Terms& terms)
       client_(std::in_place, shared.dispatcher,
               [this](Message&& message) { onMessage(std::move(message)); }) {
   client_->setRunReceiver(*this);
+}
+
+void FarClient::bind(const std::string& server, std::int32_t location) {
+  client_->bind(server, location);
+  if (client_->lacksResources()) throw std::runtime_error(client_->notConnectedBecause());
 }
 
 std::int64_t FarClient::fullWindow() const noexcept {

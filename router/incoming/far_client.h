@@ -64,7 +64,8 @@ class FarClient final : private RunReceiver {
   FarClient(const FarClient&) = delete;
   FarClient& operator=(const FarClient&) = delete;
 
-  void bind(const std::string& server, std::int32_t location) { client_->bind(server, location); }
+  //   throws  std::runtime_error when this process has no descriptor, memory or thread for it
+  void bind(const std::string& server, std::int32_t location);
   //   throws  ProtocolError
   void request(wire::Request::Reader request);
   void request(PlainItem& item);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "router/transport/kj_text.h"
+#include "server/programs/server_log.h"
 
 namespace mpf::router {
 namespace {
@@ -43,6 +44,7 @@ Proxy::Proxy(RouterContext& context, RemoteConnection& connection, const ServerN
       server_(context.backplane, name.server,
               optionsFor(context, name, offer, connection.line().maxMessageBytes())),
       again_(context.timer, [this] { onReadable(); }) {
+  logShortages(server_, log_);
   server_.onClient([this](std::uint64_t client, bool isThere) { onClient(client, isThere); });
   readable_ =
       std::make_unique<Readable>(context.port, server_.descriptor(), [this] { onReadable(); });

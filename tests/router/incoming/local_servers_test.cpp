@@ -6,6 +6,7 @@
 
 #include "tests/router/client_items.h"
 #include "tests/router/router_parts_fixture.h"
+#include "tests/support/no_descriptors.h"
 
 namespace mpf::test {
 namespace {
@@ -37,8 +38,10 @@ class LocalServersTest : public RouterPartsTest {
     sendItems({bind(1)});
     EXPECT_THAT(nextItem(), HasSubstr("state = there"));
   }
-  // Opens client 1 of binding 1.
-  void openClient() { sendItems({open(1, 1, monitors_.of({0, "echo"})->incarnation())}); }
+  // Opens a client of binding 1.
+  void openClient(std::uint32_t number = 1) {
+    sendItems({open(number, 1, monitors_.of({0, "echo"})->incarnation())});
+  }
   // Sends a request of client 1, which the server receives.
   Message receiveRequest(std::uint32_t id, std::int32_t value = 0) {
     sendItems({test::request(1, id, value)});
@@ -102,6 +105,17 @@ TEST_F(LocalServersTest, CarryARequestAndItsReply) {
                                 HasSubstr("value = 43")));
   sendItems({test::close(1)});
   EXPECT_EQ(record_->clients, 0u);
+}
+
+TEST_F(LocalServersTest, RefuseAClientThatLacksADescriptor) {
+  bindToServer();
+  openClient();
+  {
+    const NoDescriptors none;
+    openClient(2);
+    EXPECT_THAT(nextItem(), AllOf(StartsWith("(refuse = (client = 2"), HasSubstr("open files")));
+  }
+  EXPECT_THAT(logged_, HasSubstr("a client is refused: "));
 }
 
 // All requests end before the peer is told that the server is absent.

@@ -5,6 +5,7 @@
 #include "tests/router/router_parts_fixture.h"
 #include "tests/router/server_items.h"
 #include "tests/support/caller.h"
+#include "tests/support/no_descriptors.h"
 
 namespace mpf::test {
 namespace {
@@ -71,6 +72,18 @@ TEST_F(ProxyTest, AReplyThatUsesUpTheWindowGivesItAllBack) {
       {replyOf(1, id, [](auto message) { message.initUser().initValue(kWindowBytes - 64); })}));
 
   EXPECT_THAT(nextItem(), HasSubstr("(credit = (client = 1, bytes = 1048576))"));
+}
+
+TEST_F(ProxyTest, AShortageOfDescriptorsIsLogged) {
+  const Caller another(dispatcher_);
+  dispatcher_.runPending();  // asks to be accepted
+  {
+    const NoDescriptors none;
+    runUntil([this] { return logged_.find("cannot accept another client") != std::string::npos; });
+  }
+
+  EXPECT_THAT(logged_, HasSubstr("\"echo\" cannot accept another client: "));
+  EXPECT_THAT(logged_, HasSubstr("ulimit -n"));
 }
 
 TEST_F(ProxyTest, RequestsThatWaitTogetherAreAnsweredTogether) {
