@@ -58,8 +58,6 @@ class GpibBoardController : public GpibController {
   virtual void recover(Bytes closing) = 0;
 
  private:
-  enum class Role : std::uint8_t { listener, talker };
-
   template <class Result>
   Result close(Result result, Bytes closing, Deadline deadline);
   GpibResult sendToListeners(std::span<const GpibAddress> at, std::uint8_t commandByte,

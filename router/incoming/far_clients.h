@@ -20,10 +20,10 @@
 #include "client/relay_dispatcher.h"
 #include "router/alarm.h"
 #include "router/incoming/far_client.h"
-#include "router/outgoing/pending_binds.h"
 #include "router/polling.h"
 #include "router/readable.h"
 #include "router/router_context.h"
+#include "router/server_name.h"
 
 namespace mpf::router {
 

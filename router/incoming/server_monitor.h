@@ -12,7 +12,7 @@
 
 #include <mpf/backplane.h>
 
-#include "router/outgoing/pending_binds.h"
+#include "router/server_name.h"
 #include "shm/watcher.h"
 
 namespace mpf::router {

@@ -15,13 +15,9 @@
 
 #include <mpf/backplane.h>
 
-namespace mpf::router {
+#include "router/server_name.h"
 
-struct ServerName {
-  std::int32_t location = 0;
-  std::string server;
-  auto operator<=>(const ServerName&) const = default;
-};
+namespace mpf::router {
 
 class PendingBinds {
  public:

@@ -25,12 +25,12 @@
 #include <mpf/message_server.h>
 
 #include "router/alarm.h"
-#include "router/outgoing/pending_binds.h"
 #include "router/outgoing/remote_connection.h"
 #include "router/outgoing/reply_window.h"
 #include "router/polling.h"
 #include "router/readable.h"
 #include "router/router_context.h"
+#include "router/server_name.h"
 #include "router/transport/line.h"
 #include "server/relay_server.h"
 

@@ -19,10 +19,10 @@
 #include <unordered_map>
 
 #include "router/alarm.h"
-#include "router/outgoing/pending_binds.h"
 #include "router/outgoing/proxy.h"
 #include "router/outgoing/remote_connection.h"
 #include "router/router_context.h"
+#include "router/server_name.h"
 
 namespace mpf::router {
 

@@ -11,7 +11,6 @@
 
 namespace mpf::router {
 
-inline constexpr kj::byte kTlsHandshakeByte = 0x16;  // the first byte of a TLS handshake record
 // The first byte of a router's greeting, which is a frame of one segment.
 inline constexpr kj::byte kFrameByte = 0;
 

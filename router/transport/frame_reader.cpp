@@ -5,6 +5,8 @@
 #include <cstring>
 #include <fmt/format.h>
 
+#include "schema/wire_places.h"
+
 namespace mpf::router {
 namespace {
 
@@ -15,11 +17,6 @@ constexpr std::size_t kMinFreeBytes = std::size_t{4} << 10;
 constexpr std::size_t kMinFreeInFrameBytes = std::size_t{16} << 10;
 // A buffer that a long frame has made larger than this is freed afterwards.
 constexpr std::size_t kMaxIdleBytes = std::size_t{4} << 20;
-
-std::uint32_t littleEndian32(const kj::byte* bytes) noexcept {
-  return std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
-         std::uint32_t{bytes[3]} << 24;
-}
 
 // Several pointers may lead to the same words, so a small frame could take very long to read. Valid
 // frames are read fewer than four times.
@@ -67,7 +64,8 @@ void FrameReader::makeRoom(std::size_t bytes) {
 // Length of the frame that begins at begin_; nullopt until its segment table has arrived.
 std::optional<std::uint64_t> FrameReader::frameBytes() const {
   if (pending() < sizeof(std::uint32_t)) return std::nullopt;
-  const std::uint64_t segments = std::uint64_t{littleEndian32(at(begin_))} + 1;
+  const std::uint64_t segments =
+      std::uint64_t{loadLittle<std::uint32_t>(buffer_.asBytes(), begin_)} + 1;
   if (segments > kMaxSegments) {
     throw ProtocolError(
         FarewellCode::PROTOCOL,
@@ -77,7 +75,8 @@ std::optional<std::uint64_t> FrameReader::frameBytes() const {
   if (pending() < table) return std::nullopt;
   std::uint64_t bytes = table;
   for (std::size_t segment = 0; segment < segments; ++segment) {
-    bytes += std::uint64_t{littleEndian32(at(begin_ + 4 * (segment + 1)))} * kWord;
+    const auto at = begin_ + 4 * (segment + 1);
+    bytes += std::uint64_t{loadLittle<std::uint32_t>(buffer_.asBytes(), at)} * kWord;
   }
   if (bytes > maxFrameBytes_) {
     throw ProtocolError(

@@ -77,7 +77,6 @@ class Referee {
   // Plays a round in which no process is stopped or killed. Returns how often each of these steps
   // is reached.
   std::map<std::string, std::uint64_t> reconnoitre(Role role, const std::set<std::string>& marks);
-  [[nodiscard]] std::uint64_t rounds() const noexcept { return rounds_; }
   // The resources that the survivors hold, as text.
   [[nodiscard]] std::string holdings() const;
 
