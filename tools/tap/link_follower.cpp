@@ -113,10 +113,8 @@ bool LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMess
     const auto next = side.follower.tryNext(copy);
     some = some || next != RingFollower::Next::nothing;
     side.wasOverrun = side.wasOverrun || next == RingFollower::Next::overrun;
-    if (next != RingFollower::Next::message) {
-      side.noteSent(counted);
-      break;
-    }
+    if (next == RingFollower::Next::nothing) side.noteSent(counted);
+    if (next != RingFollower::Next::message) break;
     ++side.seen;
     messages.push_back(read(copy, side, direction));
   }

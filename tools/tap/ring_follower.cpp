@@ -64,6 +64,13 @@ void RingFollower::goBehindNewest() noexcept {
     position_ = newest - 1 + std::clamp<std::uint32_t>(slots, 1, layout::kMaxMessageSlots);
 }
 
+// From behind the newest message to an earlier one: at most a quarter of the ring back.
+void RingFollower::goBack() noexcept {
+  const auto newest = position_;
+  position_ -= std::min(newest, capacity_ / 4);
+  while (position_ != newest && !isFilled(position_)) ++position_;
+}
+
 // Whether the producer is more than half a ring ahead. Of any kMaxMessageSlots successive slots
 // that the producer has passed, at least one is the first slot of a message and has its sequence
 // number.
@@ -83,7 +90,12 @@ RingFollower::Next RingFollower::tryNext(RingCopy& copy) noexcept {
   const bool whole = filled && tryCopy(slots, copy);
   // PAIR(slot-filled): the message is copied first, and then the producer's position is read.
   std::atomic_thread_fence(std::memory_order_acquire);
-  if (isOverrun() || (filled && !whole)) {
+  if (isOverrun()) {
+    goBehindNewest();
+    goBack();
+    return Next::overrun;
+  }
+  if (filled && !whole) {
     goBehindNewest();
     return Next::overrun;
   }

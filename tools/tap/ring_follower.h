@@ -8,7 +8,8 @@
 //
 // A message stays in the ring until the producer reuses its slots. The follower copies it and then
 // reads the position of the producer: if that is less than half a ring ahead, the copy is
-// consistent. Otherwise the follower continues behind the newest message and reports an overrun.
+// consistent. Otherwise the follower reports an overrun and continues a quarter of the ring behind
+// the newest message, so that it can read some messages before the next overrun.
 //
 // Threads  one.
 // Crash    the producer may die at any time; the messages that it published are read.
@@ -46,7 +47,7 @@ class RingFollower {
                FollowFrom from) noexcept;
 
   enum class Next { nothing, message, overrun };
-  // `overrun`: the producer was too fast; the next call continues behind the newest message.
+  // `overrun`: the producer was too fast; the next call continues at a later message.
   Next tryNext(RingCopy& copy) noexcept;
 
  private:
@@ -59,6 +60,7 @@ class RingFollower {
   [[nodiscard]] bool continuesAt(std::uint64_t position) const noexcept;
   void moveTo(std::uint64_t position) noexcept;
   void goBehindNewest() noexcept;
+  void goBack() noexcept;
   bool tryCopy(std::uint32_t slots, RingCopy& copy) const noexcept;
 
   const layout::Slot* slots_;

@@ -30,14 +30,12 @@ struct TapArguments : ServerArguments {
   bool printAll = false;
 };
 
-// Of the number of a link. It is random, so one with fewer digits was cut off.
-constexpr std::size_t kFewestDigits = 8;
+constexpr std::size_t kFewestDigits = 6;  // of the number of a link, as for inspect
 constexpr int kShortPauses = 32;  // ratio of the longest pause to the shortest
 
-std::uint64_t linkNumber(const std::string& digits) {
-  if (digits.empty()) return 0;
-  const auto number = tryNumber<std::uint64_t>(digits, 16);
-  if (number && digits.size() >= kFewestDigits) return *number;
+void checkLink(const std::string& digits) {
+  if (digits.empty() || (digits.size() >= kFewestDigits && tryNumber<std::uint64_t>(digits, 16)))
+    return;
   throw std::invalid_argument(fmt::format(
       "tap: \"{}\" is not a link: use its hexadecimal number, as tap and inspect show it", digits));
 }
@@ -52,10 +50,12 @@ int tap(const TapArguments& arguments) {
   std::atomic<bool> stopped{false};
   const StopSignals stop(
       [](void* flag) noexcept { static_cast<std::atomic<bool>*>(flag)->store(true); }, &stopped);
+  checkLink(arguments.link);
   const auto sink = sinkFor(arguments);
-  TapSession session({Backplane::named(arguments.backplane).name(), arguments.server,
-                      arguments.location, linkNumber(arguments.link)},
-                     *sink);
+  TapSession session(
+      {Backplane::named(arguments.backplane).name(), arguments.server, arguments.location,
+       arguments.link, arguments.count != 0 ? arguments.count : UINT64_MAX},
+      *sink);
   if (session.isServerThere()) {
     printError("mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(),
                session.links() == 1 ? "" : "s");
@@ -81,7 +81,8 @@ int tap(const TapArguments& arguments) {
   for (const auto& problem : session.problems()) printError("mpf tap: {}\n", problem);
   printError("mpf tap: {} seen, {} missed\n", counted(session.seen(), "message"), session.missed());
   if (session.goneLinks() != 0)
-    printError("mpf tap: {} links were removed before tap could read them\n", session.goneLinks());
+    printError("mpf tap: {} ended before tap could read them\n",
+               counted(session.goneLinks(), "link"));
   return session.problems().empty() ? 0 : 1;
 }
 
@@ -96,7 +97,8 @@ void addTap(CLI::App& app, Run& run) {
   command.add_option("--count", arguments->count, "End after this many messages; 0: no limit")
       ->capture_default_str()
       ->check(wholeNumber(0));
-  command.add_option("--link", arguments->link, "Only this link: its hexadecimal number");
+  command.add_option("--link", arguments->link,
+                     "Only this link: its hexadecimal number, or at least 6 of its first digits");
   command
       .add_option("--write", arguments->file,
                   "Write to this file, for `mpf replay`, instead of to stdout")

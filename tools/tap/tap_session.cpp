@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "shm/segment_name.h"
+#include "tools/inspect/dissect.h"
 #include "tools/inspect/segment_image.h"
 
 namespace mpf::tools {
@@ -44,7 +45,7 @@ bool TapSession::isWanted(const std::string& name) const {
   const auto parsed = SegmentName::tryParse(name);
   return parsed && parsed->kind == NameKind::link && parsed->backplane == selection_.backplane &&
          parsed->serverWindow == incarnation_ &&
-         (selection_.link == 0 || parsed->incarnation == selection_.link);
+         hex(parsed->incarnation).starts_with(selection_.link);
 }
 
 // Looks at all names: at the start, when the server has appeared, and every kLookEvery to find
@@ -108,8 +109,8 @@ std::optional<TapSession::Followed> TapSession::tryOpen(const std::string& name,
 
 bool TapSession::runOnce() {
   const auto names = names_.take();
+  if (names) lookAtNew(*names);
   if (!names || lookAgain_.hasPassed()) lookAtNames(FollowFrom::first);
-  else lookAtNew(*names);
   bool some = false;
   for (auto& [name, followed] : followed_) {
     if (take(followed)) some = true;
@@ -122,6 +123,8 @@ bool TapSession::take(Followed& followed) {
   batch_.clear();
   const bool some = followed.follower->take(batch_);
   const auto atNs = Clock::wallNs();
+  if (const auto left = selection_.count - seen_; batch_.size() > left)
+    batch_.erase(batch_.begin() + static_cast<std::ptrdiff_t>(left), batch_.end());
   for (const auto& message : batch_) sink_.message(atNs, followed.link, message);
   seen_ += batch_.size();
   return some;

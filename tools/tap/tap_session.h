@@ -29,7 +29,8 @@ struct TapSelection {
   std::string backplane;
   std::string server;
   std::int32_t location = 0;
-  std::uint64_t link = 0;  // 0: all links of the server
+  std::string link;  // the first digits of its number; empty: all links of the server
+  std::uint64_t count = UINT64_MAX;  // of messages for the sink; later ones are ignored
 };
 
 class TapSession {

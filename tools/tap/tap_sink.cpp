@@ -10,6 +10,7 @@
 #include "schema/conversion.h"
 #include "schema/json.h"
 #include "schema/text.h"
+#include "tools/inspect/dissect.h"
 #include "tools/tap/recording.h"
 #include "tools/text/json_text.h"
 #include "tools/text/show.h"
@@ -20,9 +21,10 @@ namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
-// The number of a link, as the names of segments contain it; and what each line repeats of it.
-std::string linkText(const TappedLink& link) { return fmt::format("{:x}", link.incarnation); }
-std::string shortLink(const TappedLink& link) { return fmt::format("{:<4.4}", linkText(link)); }
+// The first digits of the number, which each line repeats.
+std::string shortLink(const TappedLink& link) {
+  return fmt::format("{:<4.4}", hex(link.incarnation));
+}
 const char* directionText(Direction direction) {
   return direction == Direction::request ? "request" : "reply";
 }
@@ -35,7 +37,7 @@ class LineSink final : public TapSink {
     const auto client = link.client.empty() ? "a client that has ended"
                                             : fmt::format("{}[{}]", link.client, link.clientPid);
     show(fmt::format("{}  --   {} and {}: link {}\n", begin(atNs, link), printable(client),
-                     printable(link.server), linkText(link)));
+                     printable(link.server), hex(link.incarnation)));
   }
   // A reply that does not end a request, for example one of a subscription, has a shorter arrow.
   void message(std::int64_t atNs, const TappedLink& link, const TappedMessage& message) override {
@@ -93,7 +95,7 @@ class JsonSink final : public TapSink {
  private:
   static void add(std::int64_t atNs, const TappedLink& link, nlohmann::json event) {
     event["at_ns"] = atNs;
-    event["link"] = linkText(link);
+    event["link"] = hex(link.incarnation);
     show(jsonText(event, -1) + "\n");
   }
 };

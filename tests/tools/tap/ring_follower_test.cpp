@@ -93,6 +93,8 @@ TEST_F(SecondRingFollowerTest, FollowsTheProducerFromMessageToMessage) {
   // The first ring was read too late: the producer is more than half of it ahead.
   RingCopy copy;
   EXPECT_EQ(follower.tryNext(copy), Next::overrun);
+  for (auto ordinal = std::uint64_t{kFirst} - 1; ordinal < pushed_; ++ordinal)
+    expectNext(follower, ordinal);
   EXPECT_EQ(follower.tryNext(copy), Next::nothing);
   push(pushed_);
   expectNext(follower, pushed_);
@@ -168,15 +170,32 @@ TEST_F(RingFollowerTest, BeginsWithTheFirstMessageWhenAsked) {
   expectNothing(follower);
 }
 
-TEST_F(RingFollowerTest, ContinuesBehindTheNewestMessageAfterAnOverrun) {
+TEST_F(RingFollowerTest, ContinuesAQuarterOfTheRingBackAfterAnOverrun) {
   auto follower = follow();
   for (std::uint64_t ordinal = 1; ordinal <= 3 * kCapacity; ++ordinal) cross(ordinal);
 
   RingCopy copy;
   EXPECT_EQ(follower.tryNext(copy), Next::overrun);
+  for (auto ordinal = 3 * kCapacity - kCapacity / 4 + 1; ordinal <= 3 * kCapacity; ++ordinal)
+    expectNext(follower, ordinal);
   expectNothing(follower);
   cross(1000);
   expectNext(follower, 1000);
+}
+
+TEST_F(RingFollowerTest, ContinuesAtABeginningOfAMessageAfterAnOverrun) {
+  for (std::uint64_t count = kCapacity; count < kCapacity + 5; ++count) {
+    auto follower = follow();
+    for (std::uint64_t ordinal = 1; ordinal <= count; ++ordinal)
+      cross(ordinal, layout::kInlineBodyBytes);
+
+    RingCopy copy;
+    EXPECT_EQ(follower.tryNext(copy), Next::overrun);
+    const auto kept = kCapacity / 4 / layout::kMaxMessageSlots;
+    for (auto ordinal = count - kept + 1; ordinal <= count; ++ordinal)
+      expectNext(follower, ordinal, layout::kInlineBodyBytes);
+    expectNothing(follower);
+  }
 }
 
 // A message of several slots does not change the sequences of its later slots, so those keep old
@@ -255,6 +274,7 @@ TEST_F(RingFollowerTest, ReportsEveryMissedMessageInAnyOrderOfOperations) {
   std::uint64_t next = 1;
   std::vector<std::size_t> sizes{0};
   std::uint64_t overruns = 0;
+  bool isLater = false;  // after an overrun, a later message is the next one
   for (int step = 0; step < 200'000; ++step) {
     switch (random.below(3)) {
       case 0: {
@@ -275,14 +295,17 @@ TEST_F(RingFollowerTest, ReportsEveryMissedMessageInAnyOrderOfOperations) {
         if (!random.oneIn(4)) break;
         RingCopy copy;
         const auto what = follower.tryNext(copy);
-        if (what == Next::nothing) {
-          EXPECT_EQ(next, pushed + 1);
-        }
+        if (what == Next::nothing && std::exchange(isLater, false)) next = pushed + 1;
+        if (what == Next::nothing) EXPECT_EQ(next, pushed + 1);
         if (what == Next::overrun) {
           ++overruns;
-          next = pushed + 1;
+          isLater = true;
         }
         if (what != Next::message) break;
+        if (std::exchange(isLater, false)) {
+          EXPECT_GT(copy.envelope.requestId, next);
+          next = copy.envelope.requestId;
+        }
         ASSERT_EQ(copy.envelope.requestId, next);
         ASSERT_EQ(Bytes(copy.body().begin(), copy.body().end()), pattern(next, sizes[next]));
         ++next;

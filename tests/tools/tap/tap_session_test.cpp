@@ -48,8 +48,8 @@ class Collector final : public TapSink {
 
 class TapSessionTest : public test::OneLinkTest {
  protected:
-  void begin(std::uint64_t link = 0) {
-    session_.emplace(TapSelection{name(), "dac", 2, link}, sink_);
+  void begin(const std::string& link = {}, std::uint64_t count = UINT64_MAX) {
+    session_.emplace(TapSelection{name(), "dac", 2, link, count}, sink_);
   }
   void runUntil(const std::function<bool()>& isDone) {
     while (!isDone()) {
@@ -141,12 +141,39 @@ TEST_F(TapSessionTest, FinishReadsTheRestWithoutClosing) {
 
 TEST_F(TapSessionTest, FollowsOnlyTheChosenLink) {
   connect();
-  const auto link = SegmentName::tryParse(linkName())->incarnation;
+  const auto link = linkName().substr(linkName().rfind('.') + 1);
 
-  begin(link);
-  EXPECT_EQ(session_->links(), 1U);
-  begin(link + 1);
+  for (const auto& digits : {link, link.substr(0, 6)}) {
+    begin(digits);
+    EXPECT_EQ(session_->links(), 1U) << digits;
+  }
+  begin(link + "0");
   EXPECT_EQ(session_->links(), 0U);
+}
+
+TEST_F(TapSessionTest, ShowsNoMoreMessagesThanItShould) {
+  connect();
+  begin({}, 3);
+  exchange(5);
+  exchange(7);
+
+  session_->runOnce();
+  session_->finish();
+
+  EXPECT_THAT(sink_.take(), ElementsAre("opened dac", "request 5", "reply 6", "request 7"));
+  EXPECT_EQ(session_->seen(), 3U);
+}
+
+// Its name appears and is gone before the session looks.
+TEST_F(TapSessionTest, CountsLinksThatEndedBeforeItLooked) {
+  openServer();
+  begin();
+
+  connectClient();
+  client_.reset();
+  runUntil([&] { return session_->goneLinks() == 1; });
+
+  EXPECT_THAT(sink_.take(), IsEmpty());
 }
 
 // The number is reported when two calls have found the same, and again when it has grown.
