@@ -333,22 +333,26 @@ nb::object make(Message&& message, bool isRequest) {
 }
 
 nb::object convert(Message&& message, bool isRequest) {
-  nb::object result;
   const auto type = message.getType();
-  if (message.isSound()) {
-    forEachType([&]<class T>(std::type_identity<T> /*type*/) {
-      if (type == T::kType) result = make<T>(std::move(message), isRequest);
-    });
-  }
-  if (!result.is_valid()) {
-    PyErr_Format(PyExc_TypeError, "a message of type %d arrived, which this version of mpf lacks",
-                 static_cast<int>(type));
-    throw nb::python_error();
-  }
+  if (!hasClass(message))
+    throw nb::type_error(("a message of type " + std::to_string(static_cast<int>(type)) +
+                          " arrived, which this version of mpf lacks")
+                             .c_str());
+  nb::object result;
+  forEachType([&]<class T>(std::type_identity<T> /*type*/) {
+    if (type == T::kType) result = make<T>(std::move(message), isRequest);
+  });
   return result;
 }
 
 }  // namespace
+
+bool hasClass(const Message& message) {
+  bool has = false;
+  forEachType(
+      [&]<class T>(std::type_identity<T> /*type*/) { has = has || message.getType() == T::kType; });
+  return has && message.isSound();
+}
 
 nb::object toPython(Message&& message) { return convert(std::move(message), false); }
 nb::object requestToPython(Message&& request) { return convert(std::move(request), true); }

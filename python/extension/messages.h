@@ -170,8 +170,10 @@ Message PyArray<T>::filled(const Allocator& allocator, std::span<const std::byte
   return message;
 }
 
+// Whether a received message has a class in Python and a body that fits it.
+[[nodiscard]] bool hasClass(const Message& message);
 // The object of Python for a received message, which it owns.
-//   throws  nb::python_error; TypeError of a type that Python does not have
+//   throws  nb::python_error; TypeError without hasClass()
 [[nodiscard]] nb::object toPython(Message&& message);
 // The same for a request, whose handle the object owns.
 [[nodiscard]] nb::object requestToPython(Message&& request);

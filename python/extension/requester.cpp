@@ -8,6 +8,11 @@
 #include "python/extension/options.h"
 
 namespace mpf::python {
+namespace {
+
+constexpr int kLastLooks = 32;  // calls of runOnce() for a request whose time has passed
+
+}  // namespace
 
 Requester::Requester(const Backplane& backplane, const std::string& server, std::int32_t location,
                      WaitMode waitMode)
@@ -63,8 +68,11 @@ void Requester::takeAnswer(Exchange& exchange, Message&& message) {
 }
 
 void Requester::takeConnect(const Connect& connect) {
-  if (connect.status == ConnectStatus::connectNo)
-    for (const auto& [id, exchange] : exchanges_) exchange->isDisconnected = true;
+  if (connect.status == ConnectStatus::connectNo) {
+    // Those that have not ended are sent again to the next server.
+    for (const auto& [id, exchange] : exchanges_)
+      exchange->isDisconnected = exchange->isDisconnected || exchange->hasEnded();
+  }
   if (keepsEvents_) events_.push_back(0);
 }
 
@@ -100,7 +108,7 @@ bool Requester::wait(const Done& isDone, Deadline deadline, const IsInterrupted&
       continue;  // it may be done now
     }
     const auto end = std::min(deadline, look);
-    if (isRunning_) changed_.wait_for(lock, end.left());
+    if (isRunning_ || lastLooks_ > 0) changed_.wait_for(lock, end.left());
     else runDispatcher(lock, end);
   }
   return true;
@@ -116,14 +124,25 @@ void Requester::waitForEnd(Exchange& exchange, Deadline deadline,
   const auto hasEnded = [&exchange] { return exchange.hasEnded(); };
   if (wait(hasEnded, deadline, isInterrupted)) return;
   std::unique_lock lock(mutex_);
-  // Delivers `expired` if the server has not received the request.
-  if (!exchange.hasEnded() && !isRunning_) runDispatcher(lock, Deadline::atNs(0));
+  lookOnceMore(lock, exchange);
   if (exchange.hasEnded()) return;
   lock.unlock();
   client_.cancel(exchange.id);
   lock.lock();
   if (!exchange.hasEnded() || exchange.fate == Fate::cancelled)
     exchange.fate = deadline.hasPassed() && !isClosed_ ? Fate::outcomeUnknown : Fate::cancelled;
+}
+
+// Delivers `expired` if the server has not received the request.
+void Requester::lookOnceMore(std::unique_lock<std::mutex>& lock, const Exchange& exchange) {
+  ++lastLooks_;
+  if (isRunning_) dispatcher_.interrupt();
+  changed_.wait(lock, [&] { return !isRunning_ || exchange.hasEnded(); });
+  // Messages come before requests that expire, and an interrupt may end one call.
+  for (int looks = 0; looks < kLastLooks && !exchange.hasEnded(); ++looks)
+    runDispatcher(lock, Deadline::atNs(0));
+  --lastLooks_;
+  changed_.notify_all();
 }
 
 Message Requester::waitForFurther(Exchange& exchange, Deadline deadline,

@@ -97,11 +97,13 @@ class Requester {
   template <class Done>
   bool wait(const Done& isDone, Deadline deadline, const IsInterrupted& isInterrupted);
   void runDispatcher(std::unique_lock<std::mutex>& lock, Deadline deadline);
+  void lookOnceMore(std::unique_lock<std::mutex>& lock, const Exchange& exchange);
 
   Dispatcher dispatcher_;
   std::mutex mutex_;  // guards all below
   std::condition_variable changed_;  // an exchange has changed, or no thread runs the dispatcher
   bool isRunning_ = false;  // a thread runs the dispatcher
+  int lastLooks_ = 0;  // threads in lookOnceMore(), which run it before those that wait
   std::unordered_map<std::uint32_t, Exchange*> exchanges_;
   std::vector<std::uint32_t> events_;
   bool keepsEvents_ = false;

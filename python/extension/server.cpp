@@ -40,14 +40,18 @@ class PyServer {
     server_ = std::make_shared<MessageServer>(Backplane::attach(backplane), name, options);
   }
 
-  // Waits for the next request; None after `timeout` and after interrupt().
+  // Waits for the next request; None after `timeout` and after interrupt(). A request that has no
+  // class is refused.
   nb::object receive(double timeout) {
     const auto server = opened();
-    if (isInterrupted_) return nb::none();
-    Message request = server->receive();
-    if (!request) request = wait(*server, deadlineOf(timeout));
-    if (!request) return nb::none();
-    return requestToPython(std::move(request));
+    const auto deadline = deadlineOf(timeout);
+    while (!isInterrupted_) {
+      Message request = server->receive();
+      if (!request) request = wait(*server, deadline);
+      if (!request) break;
+      if (hasClass(request)) return requestToPython(std::move(request));
+    }
+    return nb::none();
   }
   // Returns false when the client has gone.
   bool reply(PyMessage& request, PyMessage& message) {

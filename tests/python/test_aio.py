@@ -161,6 +161,26 @@ async def test_a_subscription_is_renewed(doubler: mpf.Server) -> None:
     assert before == after == [1, 2]
 
 
+async def test_another_task_may_close_a_subscription(silent: Silent) -> None:
+    async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
+        replies = client.subscribe(mpf.Int32())
+
+        async def values() -> list[int]:
+            return [reply.value async for reply in replies]
+
+        for hasReply in (False, True):
+            received = asyncio.ensure_future(values())
+            assert await asyncio.to_thread(silent.came.acquire, timeout=PATIENCE)
+            if hasReply:
+                silent.server.reply(silent.requests[-1], mpf.Int32(5))
+                while replies._request is None or replies._request.result(check=False) is None:
+                    await asyncio.sleep(0.001)
+            replies.close()
+
+            assert await received == ([5] if hasReply else [])
+            replies = client.subscribe(mpf.Int32())
+
+
 async def test_a_thousand_subscriptions_of_one_client() -> None:
     sources = []
     # room for a thousand replies of two slots beyond the first ones

@@ -133,6 +133,27 @@ def test_a_request_that_no_server_takes_expires(
             client.int32(timeout=0.05)
 
 
+def test_a_request_expires_while_another_thread_waits(
+    start: Callable[..., subprocess.Popen[str]],
+) -> None:
+    """The other thread may handle what belongs to this one."""
+    process = start(PROGRAMS / "mpf-int32-server")
+    with mpf.Client("Int32") as client:
+        client.int32(timeout=PATIENCE)
+        process.send_signal(signal.SIGSTOP)
+        os.waitpid(process.pid, os.WUNTRACED)
+        other = client.send(mpf.Int32(), PATIENCE)
+        waiting = threading.Thread(target=lambda: other.wait(check=False))
+        waiting.start()
+
+        for _ in range(20):
+            with pytest.raises(mpf.Expired):
+                client.int32(timeout=0.02)
+
+        process.send_signal(signal.SIGCONT)
+        waiting.join()
+
+
 def test_a_reply_may_be_asked_for_again(doubler: mpf.Server) -> None:
     doubler.on(mpf.Float64Array)(lambda request: request.value * 2)
     with mpf.Client("doubler", timeout=PATIENCE) as client:

@@ -59,6 +59,31 @@ def test_a_tap_that_cannot_start_says_why() -> None:
         next(mpf.tap("doubler", location=2**40))
 
 
+def test_a_tap_ends_when_it_is_closed(doubler: mpf.Server) -> None:
+    with mpf.Client("doubler") as client, mpf.tap("doubler") as messages:
+        while not client.int32(timeout=PATIENCE):
+            pass
+        for _ in messages:
+            messages.close()
+
+
+@pytest.mark.parametrize(
+    ("file", "reason"), [("nowhere/calls.mpf", "No such file"), ("/dev/full", "No space")]
+)
+def test_a_recording_that_cannot_be_written_is_an_error(
+    tmp_path: Path, file: str, reason: str
+) -> None:
+    with pytest.raises(mpf.Error, match=reason):
+        mpf.record("dac", tmp_path / file)
+
+
+def test_a_recording_that_fails_is_an_error(doubler: mpf.Server, tmp_path: Path) -> None:
+    recording = mpf.record("doubler", tmp_path / "calls.mpf")
+    recording._process.kill()
+    with pytest.raises(mpf.Error):
+        recording.close()
+
+
 def test_a_recording_answers_as_the_server_did(tmp_path: Path) -> None:
     file = tmp_path / "calls.mpf"
     with mpf.Server("dac") as server:
@@ -69,12 +94,13 @@ def test_a_recording_answers_as_the_server_did(tmp_path: Path) -> None:
                 raise mpf.StatusError("no such channel", status=-9)
             return request.value + 1
 
-        with server.start(), mpf.Client("dac") as client, mpf.record("dac", file):
+        with server.start(), mpf.Client("dac") as client, mpf.record("dac", file) as recording:
             for value in range(5):
                 client.int32(value, timeout=PATIENCE)
             with pytest.raises(mpf.StatusError):
                 client.int32(cmd=9, timeout=PATIENCE)
 
+    assert recording.missed == 0
     with mpf.replay(file, speed=0) as ghost, mpf.Client("dac") as client:
         assert [client.int32(value, timeout=PATIENCE).value for value in (3, 0, 4)] == [4, 1, 5]
         with pytest.raises(mpf.StatusError, match="no such channel"):
@@ -83,6 +109,15 @@ def test_a_recording_answers_as_the_server_did(tmp_path: Path) -> None:
             client.float64(timeout=PATIENCE)
 
     assert ghost.counts == {"requests": 5, "similar": 0, "unknown": 1, "silent": 0, "replies": 4}
+
+
+def test_a_ghost_that_has_died_is_an_error(doubler: mpf.Server, tmp_path: Path) -> None:
+    with mpf.record("doubler", tmp_path / "calls.mpf"), mpf.Client("doubler") as client:
+        client.int32(timeout=PATIENCE)
+    ghost = mpf.replay(tmp_path / "calls.mpf", "ghost")
+    ghost._process.kill()
+    with pytest.raises(mpf.Error):
+        ghost.close()
 
 
 def test_a_file_that_is_no_recording_is_an_error(tmp_path: Path) -> None:

@@ -187,11 +187,12 @@ async def test_values_without_a_subscription_are_read_again(dac: Dac) -> None:
         dac.values[mpf.Float64] += 0.5
 
 
-async def test_observers_learn_that_the_server_has_ended() -> None:
+@pytest.mark.parametrize("options", [{"subscribe": mpf.OutOfBand()}, {}])
+async def test_observers_learn_that_the_server_has_ended(options: dict[str, Any]) -> None:
     server = Dac()
     severities: asyncio.Queue[int] = asyncio.Queue()
     with server.start():
-        signal = await connected(voltage(subscribe=mpf.OutOfBand(), poll=0.001))
+        signal = await connected(voltage(poll=0.001, **options))
         signal.subscribe_reading(
             lambda reading: severities.put_nowait(reading["voltage"]["alarm_severity"])
         )
@@ -202,6 +203,32 @@ async def test_observers_learn_that_the_server_has_ended() -> None:
         while await severities.get() != 0:
             pass
     signal.clear_sub(signal._cache._listeners.copy().pop())
+
+
+async def test_observers_learn_that_a_later_reply_is_an_error(dac: Dac) -> None:
+    @dac.on(mpf.OutOfBand)
+    async def fail(request: mpf.OutOfBand) -> AsyncIterator[float]:
+        yield mpf.Float64(1)
+        raise mpf.StatusError("broken")
+
+    severities: asyncio.Queue[int] = asyncio.Queue()
+    signal = await connected(voltage(subscribe=mpf.OutOfBand(), poll=0.001))
+    signal.subscribe_reading(
+        lambda reading: severities.put_nowait(reading["voltage"]["alarm_severity"])
+    )
+    assert [await severities.get() for _ in range(4)] == [0, -1, 0, -1]
+    signal.clear_sub(signal._cache._listeners.copy().pop())
+
+
+async def test_a_write_has_all_fields_of_its_template(dac: Dac) -> None:
+    found = []
+    dac.on(mpf.Char8Array)(lambda request: found.append((request.text, request.eom)))
+    template = mpf.Char8Array(cmd=0x82, eom=b"\r")
+    signal = await connected(mpf_signal_w(str, "dac", template, name="text"))
+
+    await signal.set("VOLT 1")
+
+    assert found == [("VOLT 1", b"\r")]
 
 
 def test_a_plan_of_bluesky_moves_and_reads(dac: Dac, engine: RunEngine) -> None:

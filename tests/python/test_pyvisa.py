@@ -46,6 +46,25 @@ def test_an_answer_may_be_read_in_parts(meter: pyvisa.resources.SerialInstrument
     assert meter.read() == "25"
 
 
+@pytest.mark.parametrize("chunk_size", [300, 20480])
+def test_an_answer_may_be_longer_than_the_buffer_of_the_server(
+    resources: pyvisa.ResourceManager,
+    line: Line,
+    start: Callable[..., object],
+    chunk_size: int,
+) -> None:
+    start(PROGRAMS / "mpf-serial-server", "scope", line.device, "1000", "--log-level", "error")
+    scope = resources.open_resource("MPF::scope::INSTR")
+    assert isinstance(scope, pyvisa.resources.SerialInstrument)
+    scope.timeout = PATIENCE * 1000
+    scope.write_termination = "\r"
+    scope.chunk_size = chunk_size
+
+    assert len(scope.query("TRACE?")) == 1500
+    assert scope.query("VOLT?") == "+1.25\r"
+    scope.close()
+
+
 def test_a_silent_instrument_is_a_timeout(meter: pyvisa.resources.SerialInstrument) -> None:
     meter.timeout = 20
     with pytest.raises(VisaIOError) as failure:
@@ -66,7 +85,7 @@ def test_serial_servers_are_listed(
     resources: pyvisa.ResourceManager, meter: pyvisa.resources.SerialInstrument
 ) -> None:
     meter.query("VOLT?")
-    assert resources.list_resources() == ("MPF::voltmeter::INSTR",)
+    assert resources.list_resources() == ("MPF0::voltmeter::INSTR",)
 
 
 def test_a_gpib_instrument(resources: pyvisa.ResourceManager, bus: None) -> None:

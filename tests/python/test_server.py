@@ -193,29 +193,6 @@ def test_a_closed_server_raises(server: mpf.Server) -> None:
         server.run()
 
 
-@pytest.mark.parametrize("isCoroutine", [False, True])
-def test_a_handler_may_close_the_server(server: mpf.Server, isCoroutine: bool) -> None:
-    if isCoroutine:
-
-        @server.on(mpf.Int32)
-        async def end(request: mpf.Int32) -> int:
-            server.close()
-            return 5
-    else:
-
-        @server.on(mpf.Int32)
-        def end(request: mpf.Int32) -> int:
-            server.close()
-            return 5
-
-    server.start()
-    with mpf.Client("tested", timeout=PATIENCE) as client:
-        assert client.int32().value == 5
-    server.close()
-    with pytest.raises(mpf.Error, match="closed"):
-        server.start()
-
-
 def test_a_server_runs_once_at_a_time(server: mpf.Server) -> None:
     server.on(mpf.Int32)(lambda request: 1)
     server.start()
@@ -230,40 +207,6 @@ def test_a_server_runs_once_at_a_time(server: mpf.Server) -> None:
 def test_only_messages_have_handlers(server: mpf.Server) -> None:
     with pytest.raises(TypeError, match="int"):
         server.on(int)  # type: ignore[type-var]
-
-
-@pytest.mark.parametrize("isAsync", [False, True])
-def test_a_generator_without_end_ends_with_its_client_and_with_the_server(
-    server: mpf.Server, isAsync: bool
-) -> None:
-    ended = threading.Semaphore(0)
-    if isAsync:
-
-        @server.on(mpf.Int32)
-        async def count(request: mpf.Int32) -> AsyncIterator[int]:
-            try:
-                while True:
-                    yield 1
-            finally:
-                ended.release()
-    else:
-
-        @server.on(mpf.Int32)
-        def count(request: mpf.Int32) -> Iterator[int]:
-            try:
-                while True:
-                    yield 1
-            finally:
-                ended.release()
-
-    server.start()
-    with mpf.Client("tested", timeout=PATIENCE) as client:
-        next(client.subscribe(mpf.Int32()))
-    assert ended.acquire(timeout=PATIENCE)
-    with mpf.Client("tested", timeout=PATIENCE) as client:
-        next(client.subscribe(mpf.Int32()))
-        server.close()
-    assert ended.acquire(timeout=PATIENCE)
 
 
 def test_a_generator_without_values_refuses_the_request(server: mpf.Server) -> None:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -66,6 +68,45 @@ def test_a_subscription_is_renewed_when_the_server_starts_again() -> None:
             after = [next(replies).value, next(replies).value]
 
     assert before == after == [1, 2]
+
+
+@pytest.mark.parametrize("hasReply", [False, True])
+def test_another_thread_may_close_a_subscription(silent: Silent, hasReply: bool) -> None:
+    with mpf.Client("silent", timeout=PATIENCE) as client:
+        replies = client.subscribe(mpf.Int32())
+        with concurrent.futures.ThreadPoolExecutor() as threads:
+            received = threads.submit(list, replies)
+            assert silent.came.acquire(timeout=PATIENCE)
+            if hasReply:
+                silent.server.reply(silent.requests[0], mpf.Int32(5))
+                while not replies._request.result(check=False):
+                    time.sleep(0.001)
+            replies.close()
+
+            assert [reply.value for reply in received.result()] == ([5] if hasReply else [])
+
+
+def test_further_replies_of_a_request_that_was_sent_again_arrive() -> None:
+    def serve() -> mpf.Server:
+        server = mpf.Server("source")
+        server.on(mpf.Int32)(lambda request: (number for number in range(3)))
+        return server
+
+    first = serve()  # does not run
+    with mpf.Client("source", timeout=PATIENCE) as client:
+        connecting = threading.Thread(target=first.run)
+        connecting.start()
+        assert client.wait_connected(PATIENCE)
+        first.interrupt()
+        connecting.join()
+        request = client.send(mpf.Int32(), PATIENCE, retry=True, further=10)
+        first.close()
+        with serve().start():
+            values = [request.wait().value]
+            while len(values) < 3:
+                values.append(request.next(PATIENCE).value)
+
+    assert values == [0, 1, 2]
 
 
 def test_a_subscription_without_renewal_ends_with_the_server() -> None:

@@ -50,7 +50,7 @@ from mpf.errors import (
     TooLarge,
     UnexpectedReply,
 )
-from mpf.inspection import Ghost, Running, Tap, record, replay, servers, stats, tap
+from mpf.inspection import Ghost, Recording, Running, Tap, record, replay, servers, stats, tap
 from mpf.instruments import Gpib, Instrument, Serial
 from mpf.server import Server
 
@@ -81,6 +81,7 @@ __all__ = [
     "OutOfBand",
     "OutcomeUnknown",
     "QueueFull",
+    "Recording",
     "Refused",
     "Request",
     "Running",

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
 from mpf._mpf import Message, Request
-from mpf.errors import Error, NeverTaken, OutcomeUnknown
+from mpf.errors import Error, is_end_of_server
 
 if TYPE_CHECKING:
     from mpf.aio import AsyncClient
@@ -123,40 +123,41 @@ class AsyncSubscription(Generic[M]):
 
     def close(self) -> None:
         """Ends the iteration, and drops later replies. The server is not told."""
-        self._drop()
         self._isClosed = True
+        self._drop()
 
     async def _first(self) -> M | None:
         client = self._client
         limit = client._until(self._timeout)
-        self._request = await client._start(
+        request = await client._start(
             self._message, limit, reply=self._reply, further=self._limit
         )
+        self._request = request
+        if self._isClosed:
+            request.close()
         try:
-            return cast(M, await client._end(self._request, limit, True))
-        except (NeverTaken, OutcomeUnknown) as error:
+            return cast(M, await client._end(request, limit, True))
+        except Error as error:
             self._drop()
-            if not self._renew or isinstance(error, TimeoutError):
-                raise
-            return None
-        except Error:
-            self._drop()
+            if self._isClosed or (self._renew and is_end_of_server(error)):
+                return None
             raise
 
     async def _further(self) -> M | None:
         limit = self._client._until(self._timeout)
-        while self._request is not None:
-            message = self._request.take_next()
+        while (request := self._request) is not None:
+            message = request.take_next()
             if message is not None:
                 return cast(M, message)
-            if not self._request.connected:
+            if not request.connected:
                 self._drop()
-            elif not await self._client._changed(self._request.id, limit):
+            elif not await self._client._changed(request.id, limit):
                 raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
         return None
 
     def _drop(self) -> None:
-        if self._request is not None:
-            self._missed += self._request.missed
-            self._request.close()
-            self._request = None
+        request, self._request = self._request, None
+        if request is not None:
+            self._missed += request.missed
+            request.close()
+            self._client._wake(request.id)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
-from mpf.errors import Error, NeverTaken, OutcomeUnknown
+from mpf.errors import Error, is_end_of_server
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -279,37 +279,36 @@ class Subscription(Generic[M]):
         return self._missed + (self._request.missed if self._request else 0)
 
     def close(self) -> None:
-        """Ends the iteration, and drops later replies. The server is not told."""
-        self._drop()
+        """Ends the iteration, and drops later replies. The server is not told. Any thread."""
         self._isClosed = True
+        self._drop()
 
     def _first(self) -> M | None:
         request = self._client._send(
             self._message, self._timeout, reply=self._reply, further=self._limit
         )
         self._request = request
+        if self._isClosed:
+            request.close()
         try:
             return cast(M, request.wait())
-        except (NeverTaken, OutcomeUnknown) as error:
+        except Error as error:
             self._drop()
-            if not self._renew or isinstance(error, TimeoutError):
-                raise
-            return None
-        except Error:
-            self._drop()
+            if self._isClosed or (self._renew and is_end_of_server(error)):
+                return None
             raise
 
     def _further(self) -> M | None:
-        assert self._request is not None
-        message = self._request.next(self._timeout)
-        if message is None and self._request.connected:
+        request = self._request
+        message = request.next(self._timeout) if request is not None else None
+        if message is None and request is not None and request.connected:
             raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
         if message is None:
             self._drop()
         return cast("M | None", message)
 
     def _drop(self) -> None:
-        if self._request is not None:
-            self._missed += self._request.missed
-            self._request.close()
-            self._request = None
+        request, self._request = self._request, None
+        if request is not None:
+            self._missed += request.missed
+            request.close()

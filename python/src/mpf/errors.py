@@ -134,6 +134,11 @@ class InstrumentTimeout(InstrumentError, TimeoutError):
     """The instrument did not answer completely, or did not accept all bytes, in time."""
 
 
+def is_end_of_server(error: Error) -> bool:
+    """Whether the connection has ended: the request may be sent again to the next server."""
+    return isinstance(error, (NeverTaken, OutcomeUnknown)) and not isinstance(error, TimeoutError)
+
+
 def _text_of(reply: Message) -> str:
     from mpf._mpf import Char8Array
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import signal
 import subprocess
 from collections.abc import Iterator
 from types import TracebackType
@@ -54,19 +56,23 @@ class Running:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        if error is None:
+            self.close()
+        else:
+            program.stop(self._process)
 
     def close(self) -> None:
-        """Ends it."""
+        """Ends it. Raises Error if it has failed."""
         program.stop(self._process)
+        if self._process.returncode not in (0, -signal.SIGTERM):
+            raise Error(program.error_of(self._process))
 
-    def _await(self, stream: IO[str] | None) -> str:
-        """The first line of its stdout or stderr."""
+    def _await(self, stream: IO[str] | None, begin: str) -> None:
+        """Waits for the first line of its stdout or stderr, which begins so unless it fails."""
         assert stream is not None
         line = stream.readline()
-        if not line or self._process.poll() not in (None, 0):
+        if not line.startswith(begin):
             raise Error((line + program.error_of(self._process)).strip())
-        return line
 
 
 class Tap(Running):
@@ -77,6 +83,8 @@ class Tap(Running):
 
     def __next__(self) -> dict[str, Any]:
         assert self._process.stdout is not None
+        if self._process.stdout.closed:  # close() was called
+            raise StopIteration
         line = self._process.stdout.readline()
         if line:
             message: dict[str, Any] = json.loads(line)
@@ -103,9 +111,24 @@ def tap(
     return Tap(["tap", server, str(seconds), *options])
 
 
+class Recording(Running):
+    """Writes messages to a file; record() creates it."""
+
+    #: After close(): the number of messages that came too fast to be written.
+    missed: int
+
+    def close(self) -> None:
+        """Ends the recording, and sets `missed`. Raises Error if the file could not be written, or
+        if messages could not be read."""
+        super().close()
+        found = re.search(r"(\d+) missed", program.error_of(self._process))
+        assert found is not None
+        self.missed = int(found[1])
+
+
 def record(
     server: str, file: str | os.PathLike[str], backplane: str = "", *, location: int | None = None
-) -> Running:
+) -> Recording:
     """Writes each message between a server and its clients from now on to a file, until close():
 
         with mpf.record("dac", "calls.mpf"):
@@ -114,8 +137,8 @@ def record(
     The same as `mpf tap --write`. Raises Error if the file cannot be written.
     """
     options = ["--write", os.fspath(file), *_backplane(backplane), *_at(location)]
-    recording = Running(["tap", server, "0", *options])
-    recording._await(recording._process.stderr)
+    recording = Recording(["tap", server, "0", *options])
+    recording._await(recording._process.stderr, "mpf tap: ")
     return recording
 
 
@@ -127,10 +150,9 @@ class Ghost(Running):
     counts: dict[str, int]
 
     def close(self) -> None:
-        """Ends the server, and sets `counts`."""
-        if self._process.poll() is None:
-            self._process.terminate()
-            self.counts = json.loads(self._process.communicate()[0])
+        """Ends the server, and sets `counts`. Raises Error if it has failed."""
+        super().close()
+        self.counts = json.loads(self._process.communicate()[0])
 
 
 def replay(
@@ -156,7 +178,7 @@ def replay(
     options = ["--server", server] if server else []
     options += ["--speed", str(speed), "--json", *_backplane(backplane), *_at(location)]
     ghost = Ghost(["replay", os.fspath(file), "--as-server", *options])
-    ghost._await(ghost._process.stdout)
+    ghost._await(ghost._process.stdout, "{")
     return ghost
 
 

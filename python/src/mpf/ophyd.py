@@ -19,7 +19,7 @@ import asyncio
 import contextlib
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import AsyncGenerator, Iterable
 from typing import Any, Generic, cast
 from weakref import WeakValueDictionary
 
@@ -46,7 +46,8 @@ from ophyd_async.core import (
 
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message
 from mpf.aio import AsyncClient
-from mpf.errors import Error
+from mpf.errors import Error, StatusError
+from mpf.server import fields_of
 
 __all__ = [
     "MpfCommandBackend",
@@ -149,26 +150,33 @@ class MpfSignalBackend(SignalBackend[SignalDatatypeT]):
             self._task = asyncio.get_running_loop().create_task(self._watch(callback))
 
     async def _watch(self, callback: Callback[Reading[SignalDatatypeT]]) -> None:
+        async for reading in self._readings():
+            callback(reading)
+
+    async def _readings(self) -> AsyncGenerator[Reading[SignalDatatypeT], None]:
         while True:
-            with contextlib.suppress(Error):
-                if self._subscribe is None:
-                    callback(await self.get_reading())
-                    await asyncio.sleep(self._poll)
-                    continue
-                await self._follow(self._subscribe, callback)
+            with contextlib.suppress(Error, TypeError):
+                async with contextlib.aclosing(self._replies()) as replies:
+                    async for reply in replies:
+                        yield self._reading(reply)
             if self._last is not None:
-                callback({**self._last, "alarm_severity": _STALE})
+                yield {**self._last, "alarm_severity": _STALE}
             await asyncio.sleep(self._poll)
 
-    async def _follow(
-        self, message: Message, callback: Callback[Reading[SignalDatatypeT]]
-    ) -> None:
-        """Until the server disconnects."""
-        async with self._server.client().subscribe(
-            message, reply=Message, renew=False
-        ) as replies:
+    async def _replies(self) -> AsyncGenerator[Message, None]:
+        """Replies with the value, until the server disconnects."""
+        client = self._server.client()
+        if self._subscribe is None:
+            assert self._read is not None
+            while await client.wait_connected(self._poll):
+                yield await client.call(self._read, DEFAULT_TIMEOUT, reply=Message)
+                await asyncio.sleep(self._poll)
+            return
+        async with client.subscribe(self._subscribe, reply=Message, renew=False) as replies:
             async for reply in replies:
-                callback(self._reading(reply))
+                if getattr(reply, "status", 0) != 0:
+                    raise StatusError(client.server, reply)
+                yield reply
 
     def _reading(self, reply: Message) -> Reading[SignalDatatypeT]:
         taken = reply.time_stamp_ns / 1e9 if reply.time_stamp_ns else time.time()
@@ -330,13 +338,8 @@ class _Converter(Generic[SignalDatatypeT]):
     def message(self, template: Message, value: Any) -> Message:
         """A message as `template`, with another value."""
         number = self._choices.index(value) if self._choices else value
-        fields = {
-            field: getattr(template, field)
-            for field in ("timeout", "cmd", "address", "extra")
-            if hasattr(template, field)
-        }
         kind: Any = type(template)
-        return kind(number, **fields)  # type: ignore[no-any-return]
+        return kind(number, **fields_of(template))  # type: ignore[no-any-return]
 
     def _choice(self, index: int) -> Any:
         if 0 <= index < len(self._choices):

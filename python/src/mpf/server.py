@@ -45,6 +45,7 @@ H = TypeVar("H", bound=Callable[..., object])
 
 _log = logging.getLogger("mpf")
 _PAUSE = 0.001  # [s] between attempts to send a reply to a full queue
+_LOOK = 0.5  # [s] between looks whether the client of a generator has gone
 _COPIED = ("timeout", "cmd", "address", "extra", "number_retrys", "eom")
 
 
@@ -83,9 +84,11 @@ class Server(_mpf.BaseServer):
             wait=wait,
         )
         self._handlers: dict[type[Message], Callable[[Any], object]] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._closing: set[asyncio.Task[Any]] = set()  # that have called close()
         self._thread: threading.Thread | None = None
-        self._runner: int | None = None  # the thread in which run() or serve() is in progress
+        self._state = threading.Condition()  # guards the next two
+        self._runner: threading.Thread | None = None  # run() or serve() is in progress there
         self._closesAtEnd = False
 
     def __enter__(self: Self) -> Self:
@@ -135,15 +138,21 @@ class Server(_mpf.BaseServer):
         return self
 
     def close(self) -> None:
-        """Ends run(), and disconnects all clients. Requests that wait end as NeverTaken. In a
-        handler: after the handler."""
-        if self._runner == threading.get_ident():
-            self._closesAtEnd = True
-            self.interrupt()
-            return
+        """Ends run() and serve(), and disconnects all clients: waiting requests end as NeverTaken.
+        In a handler, it ends them after the handler. In another thread, it waits for their end."""
+        with self._state:
+            if self._runner is not None or self._thread is not None:
+                with contextlib.suppress(Error):  # it is closed, or that of a parent process
+                    self.interrupt()
+            if self._runner is threading.current_thread():
+                self._closesAtEnd = True
+                if (task := _current_task()) is not None:
+                    self._closing.add(task)
+                return
+            # After a fork, the thread that runs the server exists only in the parent.
+            while self._runner is not None and self._runner.is_alive():
+                self._state.wait(1)
         if self._thread is not None:
-            with contextlib.suppress(Error):  # a handler may have closed it
-                self.interrupt()
             self._thread.join()
             self._thread = None
         self._close()
@@ -171,15 +180,18 @@ class Server(_mpf.BaseServer):
 
     @contextlib.contextmanager
     def _running(self) -> Generator[None]:
-        if self._runner is not None:
-            raise RuntimeError(f"{self.name}: the server runs already")
-        self._runner = threading.get_ident()
+        with self._state:
+            if self._runner is not None:
+                raise RuntimeError(f"{self.name}: the server runs already")
+            self._runner = threading.current_thread()
         try:
             yield
         finally:
-            self._runner = None
-            if self._closesAtEnd:
-                self._close()
+            with self._state:
+                self._runner = None
+                if self._closesAtEnd:
+                    self._close()
+                self._state.notify_all()
 
     async def _serve(self) -> None:
         loop = asyncio.get_running_loop()
@@ -194,7 +206,7 @@ class Server(_mpf.BaseServer):
                 readable.clear()
         finally:
             loop.remove_reader(descriptor)
-            for task in self._tasks:
+            for task in self._tasks - self._closing:
                 task.cancel()
             await asyncio.gather(*self._tasks, return_exceptions=True)
 
@@ -240,12 +252,32 @@ class Server(_mpf.BaseServer):
     async def _answer_each(self, request: Message, values: AsyncGenerator[object]) -> None:
         hasReplied = False
         async with contextlib.aclosing(values):
-            async for value in values:
-                while not self._try_reply(request, value):
-                    await asyncio.sleep(_PAUSE)
-                hasReplied = True
+            with self._cancelled_without_client(request):
+                async for value in values:
+                    while not self._try_reply(request, value):
+                        await asyncio.sleep(_PAUSE)
+                    hasReplied = True
         if not hasReplied:
             self.refuse(request)
+
+    @contextlib.contextmanager
+    def _cancelled_without_client(self, request: Message) -> Generator[None]:
+        """Cancels the current task when the client has gone: it may wait for something else."""
+        loop, task = asyncio.get_running_loop(), asyncio.current_task()
+        assert task is not None
+
+        def look() -> None:
+            nonlocal timer
+            if self.is_client_connected(request):
+                timer = loop.call_later(_LOOK, look)
+            else:
+                task.cancel()
+
+        timer = loop.call_later(_LOOK, look)
+        try:
+            yield
+        finally:
+            timer.cancel()
 
     def _handle(self, request: Message) -> object:
         handler = self._handlers.get(type(request)) or self._handlers.get(Message)
@@ -294,7 +326,7 @@ class Server(_mpf.BaseServer):
             status, text = _status_of(error), error.text
         else:
             status, text = -1, f"{type(error).__name__}: {error}"
-        fields: dict[str, Any] = {**_fields_of(request), "status": status}
+        fields: dict[str, Any] = {**fields_of(request), "status": status}
         try:
             self.reply(request, Char8Array(text.encode("utf-8", "backslashreplace"), **fields))
         except Error as failure:
@@ -304,6 +336,13 @@ class Server(_mpf.BaseServer):
 def _check_class(kind: object) -> None:
     if not (isinstance(kind, type) and issubclass(kind, Message)):
         raise TypeError(f"on: {kind!r} is not a class of messages, for example mpf.Int32")
+
+
+def _current_task() -> asyncio.Task[Any] | None:
+    try:
+        return asyncio.current_task()
+    except RuntimeError:  # no event loop runs in this thread
+        return None
 
 
 class _NoMoreReplies(Exception):
@@ -319,7 +358,7 @@ def _like(request: Message, value: object) -> Message:
     """The request with this value."""
     kind = cast(Callable[..., Message], type(request))
     try:
-        return kind(value, **_fields_of(request))
+        return kind(value, **fields_of(request))
     except TypeError as error:
         name = type(request).__name__
         raise TypeError(
@@ -328,5 +367,7 @@ def _like(request: Message, value: object) -> Message:
         ) from error
 
 
-def _fields_of(request: Message) -> dict[str, Any]:
-    return {name: getattr(request, name) for name in _COPIED if hasattr(request, name)}
+def fields_of(message: Message) -> dict[str, Any]:
+    """The fields that a message has in common with another one of its kind: all but the value, the
+    status and the time stamp."""
+    return {name: getattr(message, name) for name in _COPIED if hasattr(message, name)}

@@ -41,7 +41,7 @@ class MpfVisaLibrary(VisaLibraryBase):
 
     def list_resources(self, session: Any, query: str = "?*::INSTR") -> tuple[str, ...]:
         names = [
-            f"MPF{one['location'] or ''}::{one['name']}::INSTR"
+            f"MPF{one['location']}::{one['name']}::INSTR"
             for one in mpf.servers()
             if one["program"].startswith("mpf-serial") and not one["name"].endswith(".sniff")
         ]

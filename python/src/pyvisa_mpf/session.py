@@ -71,6 +71,7 @@ class Session:
             for attribute in (ResourceAttribute.asrl_end_in, ResourceAttribute.asrl_end_out):
                 self.attributes[attribute] = constants.SerialTermination.none
         self._unread = b""
+        self._is_complete = True  # with the unread bytes, the answer is complete
 
     def close(self) -> None:
         self.instrument.close()
@@ -83,11 +84,10 @@ class Session:
         return len(data)
 
     def read(self, count: int) -> tuple[bytes, StatusCode]:
-        is_complete = True
         if not self._unread:
-            self._unread, is_complete = self._receive()
+            self._unread, self._is_complete = self._receive()
         taken, self._unread = self._unread[:count], self._unread[count:]
-        if self._unread or not is_complete:
+        if self._unread or not self._is_complete:
             return taken, StatusCode.success_max_count_read
         if taken.endswith(self._termchar() or b"\0\0"):
             return taken, StatusCode.success_termination_character_read

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""mpf.Server: what ends it, what ends its generators, and what does not."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import importlib
+import sys
+import threading
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import pytest
+from conftest import PATIENCE
+
+import mpf
+
+LAYOUT = Path(__file__).parent.parent / "layout" / "v1_0"
+
+
+@pytest.fixture
+def server() -> Iterator[mpf.Server]:
+    with mpf.Server("tested") as server:
+        yield server
+
+
+def call(message: mpf.Int32) -> int:
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        return client.call(message, PATIENCE).value
+
+
+@pytest.mark.parametrize("isCoroutine", [False, True])
+def test_run_ends_when_another_thread_closes_the_server(
+    server: mpf.Server, isCoroutine: bool
+) -> None:
+    if isCoroutine:
+
+        @server.on(mpf.Int32)
+        async def answer(request: mpf.Int32) -> int:
+            return 5
+    else:
+        server.on(mpf.Int32)(lambda request: 5)
+
+    with concurrent.futures.ThreadPoolExecutor() as threads:
+        running = threads.submit(server.run)
+        call(mpf.Int32())
+        server.close()
+
+        assert running.result() is None
+
+
+@pytest.mark.parametrize("isCoroutine", [False, True])
+def test_a_handler_may_close_the_server(server: mpf.Server, isCoroutine: bool) -> None:
+    if isCoroutine:
+
+        @server.on(mpf.Int32)
+        async def end(request: mpf.Int32) -> int:
+            server.close()
+            return 5
+    else:
+
+        @server.on(mpf.Int32)
+        def end(request: mpf.Int32) -> int:
+            server.close()
+            return 5
+
+    server.start()
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        assert client.int32().value == 5
+    server.close()
+    with pytest.raises(mpf.Error, match="closed"):
+        server.start()
+
+
+def test_a_coroutine_that_closes_the_server_ends_first(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    async def end(request: mpf.Int32) -> int:
+        server.close()
+        for _ in range(10):
+            await asyncio.sleep(0.001)
+        return 5
+
+    server.start()
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        assert client.int32().value == 5
+    server.close()
+
+
+@pytest.mark.parametrize("isAsync", [False, True])
+def test_a_generator_without_end_ends_with_its_client_and_with_the_server(
+    server: mpf.Server, isAsync: bool
+) -> None:
+    ended = threading.Semaphore(0)
+    if isAsync:
+
+        @server.on(mpf.Int32)
+        async def count(request: mpf.Int32) -> AsyncIterator[int]:
+            try:
+                while True:
+                    yield 1
+            finally:
+                ended.release()
+    else:
+
+        @server.on(mpf.Int32)
+        def count(request: mpf.Int32) -> Iterator[int]:
+            try:
+                while True:
+                    yield 1
+            finally:
+                ended.release()
+
+    server.start()
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        next(client.subscribe(mpf.Int32()))
+    assert ended.acquire(timeout=PATIENCE)
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        next(client.subscribe(mpf.Int32()))
+        server.close()
+    assert ended.acquire(timeout=PATIENCE)
+
+
+def test_an_async_generator_that_waits_ends_with_its_client(server: mpf.Server) -> None:
+    ended = threading.Semaphore(0)
+
+    @server.on(mpf.Int32)
+    async def wait(request: mpf.Int32) -> AsyncIterator[int]:
+        yield 1
+        try:
+            await asyncio.Event().wait()
+        finally:
+            ended.release()
+
+    with server.start():
+        with mpf.Client("tested", timeout=PATIENCE) as client:
+            next(client.subscribe(mpf.Int32()))
+        assert ended.acquire(timeout=PATIENCE)
+
+
+def test_a_message_without_a_class_is_refused(server: mpf.Server, backplane: str) -> None:
+    """Any program of the host may send one. The peer builds it byte by byte."""
+    sys.path.insert(0, str(LAYOUT))
+    client, messages, party, reader = map(
+        importlib.import_module, ("client", "messages", "party", "reader")
+    )
+    server.on(mpf.Int32)(lambda request: 5)
+    with server.start():
+        peer = client.Client(reader.Layout(LAYOUT / "layout.md"), backplane)
+        connection = peer.connect("tested")
+        party.run_until(lambda: connection.is_open, peer)
+        number = connection.send(messages.REQUEST_FATE, messages.request_fate(0, 1))
+        party.run_until(lambda: connection.received, peer)
+        [fate] = connection.received
+        peer.close()
+
+        assert messages.value(fate) == (messages.REFUSED, number)
+        assert call(mpf.Int32()) == 5
