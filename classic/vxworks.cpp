@@ -30,16 +30,19 @@ int mpf::classic::spawnTask(const char* name, FUNCPTR entry, const Word (&words)
   using Entry = void (*)(Word, Word, Word, Word, Word, Word, Word, Word, Word, Word);
   const auto run = reinterpret_cast<Entry>(reinterpret_cast<void (*)()>(entry));
   static std::atomic<int> tasks{0};
+  const auto number = tasks.fetch_add(1, std::memory_order_relaxed) + 1;
+  // As in VxWorks, a task without a name is t1, t2, ...
+  const auto title = name != nullptr ? std::string(name) : "t" + std::to_string(number);
   try {
-    std::thread([run, name = std::string(name), w = std::to_array(words)] {
-      ::pthread_setname_np(::pthread_self(), name.substr(0, kMaxThreadName).c_str());
+    std::thread([run, title, w = std::to_array(words)] {
+      ::pthread_setname_np(::pthread_self(), title.substr(0, kMaxThreadName).c_str());
       run(w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8], w[9]);
     }).detach();
   } catch (const std::system_error& error) {
-    mpf::printError("taskSpawn: cannot start task {}: {}\n", name, error.what());
+    mpf::printError("taskSpawn: cannot start task {}: {}\n", title, error.what());
     return ERROR;
   }
-  return tasks.fetch_add(1, std::memory_order_relaxed) + 1;
+  return number;
 }
 
 STATUS taskDelay(int ticks) {

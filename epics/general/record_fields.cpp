@@ -13,12 +13,18 @@ namespace {
 
 // ---- numbers
 
-// The bits of the value that the link selects.
-std::optional<std::int64_t> selectedInteger(const Value& value, const Options& options) {
-  if (!options.selectsBits()) return toInteger(value);
-  const auto bits = toBits(value);
-  if (!bits) return std::nullopt;
-  return (*bits & options.mask.value_or(UINT32_MAX)) >> options.shift.value_or(0);
+// The value, or the bits of it that the link selects. In a record of 32 bits, the highest one is
+// the sign, as in a message that it sends.
+template <class Integer>
+std::optional<Integer> selected(const Value& value, const Options& options) {
+  if (options.selectsBits()) {
+    const auto bits = toBits(value);
+    if (!bits) return std::nullopt;
+    return static_cast<Integer>((*bits & options.mask.value_or(UINT32_MAX)) >>
+                                options.shift.value_or(0));
+  }
+  const auto integer = toInteger(value);
+  return integer ? fit<Integer>(*integer) : std::nullopt;
 }
 
 // 32 bits, as the signed number of an Int32 message.
@@ -32,8 +38,7 @@ Value placedInteger(std::int64_t number, const Options& options) {
 
 template <class Record>
 Stored storeInteger(Record& record, const Value& value, const Options& options) {
-  const auto integer = selectedInteger(value, options);
-  const auto number = integer ? fit<decltype(record.val)>(*integer) : std::nullopt;
+  const auto number = selected<decltype(record.val)>(value, options);
   if (!number) return Stored::doesNotFit;
   record.val = *number;
   record.udf = FALSE;
@@ -135,8 +140,7 @@ Stored storeArray(Record& record, const Value& value) {
 
 Stored store(aiRecord& record, const Value& value, const Options& options) {
   if (isRaw(value)) {
-    const auto integer = selectedInteger(value, options);
-    const auto raw = integer ? fit<epicsInt32>(*integer) : std::nullopt;
+    const auto raw = selected<epicsInt32>(value, options);
     if (!raw) return Stored::doesNotFit;
     record.rval = *raw;
     return Stored::done;
@@ -154,8 +158,7 @@ Stored store(aiRecord& record, const Value& value, const Options& options) {
 Stored store(aoRecord& record, const Value& value, const Options& options) {
   std::optional<double> number;
   if (isRaw(value)) {
-    const auto integer = selectedInteger(value, options);
-    const auto raw = integer ? fit<epicsInt32>(*integer) : std::nullopt;
+    const auto raw = selected<epicsInt32>(value, options);
     if (raw) number = engineeringOfRaw(record, *raw);
   } else if (const auto sample = toDouble(value)) {
     number = adjusted(record, *sample);

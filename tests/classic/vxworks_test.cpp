@@ -17,10 +17,10 @@ struct Device {
     self->sum = static_cast<int>(two + three);
     return semGive(self->done);
   }
-  int start() {
+  int start(const char* name) {
     // NOLINTNEXTLINE: an old source
-    return taskSpawn("device", 100, VX_FP_TASK, 2000, reinterpret_cast<FUNCPTR>(&task), (int)this,
-                     2, (int)3, 0, 0, 0, 0, 0, 0, 0);
+    return taskSpawn(name, 100, VX_FP_TASK, 2000, reinterpret_cast<FUNCPTR>(&task), (int)this, 2,
+                     (int)3, 0, 0, 0, 0, 0, 0, 0);
   }
   ~Device() { semDelete(done); }
 };
@@ -28,10 +28,18 @@ struct Device {
 TEST(VxWorks, ATaskGetsAPointerThatWasCastToInt) {
   Device device;
 
-  EXPECT_NE(device.start(), ERROR);
+  EXPECT_NE(device.start("device"), ERROR);
 
   EXPECT_EQ(semTake(device.done, WAIT_FOREVER), OK);
   EXPECT_EQ(device.sum, 5);
+}
+
+TEST(VxWorks, ATaskMayHaveNoName) {
+  Device device;
+
+  EXPECT_NE(device.start(nullptr), ERROR);
+
+  EXPECT_EQ(semTake(device.done, WAIT_FOREVER), OK);
 }
 
 TEST(VxWorks, ABinarySemaphoreIsTakenOnce) {

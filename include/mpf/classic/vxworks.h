@@ -47,6 +47,7 @@ namespace mpf::classic {
 typedef std::intptr_t Word;
 
 // Starts a thread that calls entry(words[0], ..., words[9]).
+//   name     nullptr: "t" and the number of the task
 //   returns  a number above 0, or ERROR
 int spawnTask(const char* name, FUNCPTR entry, const Word (&words)[10]);
 

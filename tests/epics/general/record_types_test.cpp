@@ -130,6 +130,27 @@ class Writes {
   std::map<std::int32_t, std::string> written_;
 };
 
+// What an output with these bits writes is read back as the same number.
+TEST_F(GeneralRecordTest, AMaskThatSelectsTheSignKeepsIt) {
+  const ThreadServer server(backplane_, "any", [](MessageServer& self, Message&& request) {
+    request.tryAs<Int32>()->value = -2;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(readAtStart("longin", "longin", "mask=0xffffffff") +
+                readAtStart("ai", "ai", "type=int32 mask=0xffffffff") +
+                readAtStart("longin", "part", "mask=0xffff0000 shift=16") +
+                readAtStart("int64in", "int64in", "mask=0xffffffff"));
+
+  for (const auto& [field, value] :
+       {Expected{"longin", "-2"}, Expected{"ai.RVAL", "-2"}, Expected{"part", "65535"},
+        Expected{"int64in", "4294967294"}}) {
+    SCOPED_TRACE(field);
+    const auto name = std::string(field).substr(0, std::string(field).find('.'));
+    Ioc::waitFor(name + ".SEVR", "NO_ALARM");
+    EXPECT_EQ(Ioc::get(field), value);
+  }
+}
+
 TEST_F(GeneralRecordTest, EachOutputRecordWritesItsValue) {
   Writes writes;
   const ThreadServer server(backplane_, "out", std::ref(writes));
