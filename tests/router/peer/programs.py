@@ -9,6 +9,12 @@ import subprocess
 import threading
 
 
+def patient(options):
+  """Options of a router, with times that a busy host does not exceed unless a test sets them."""
+  times = [time for time in ("--dead-time", "--handshake-time") if time not in options]
+  return [*options, *(word for time in times for word in (time, "60s"))]
+
+
 class Programs:
   def __init__(self, folder):
     self.folder_ = folder
@@ -38,7 +44,7 @@ class Programs:
         "mpf-router",
         "--backplane",
         backplane,
-        *arguments,
+        *patient(arguments),
         "--listen",
         "127.0.0.1:0",
         "--plain",
@@ -56,7 +62,14 @@ class Programs:
     """Starts a router that connects to `address` for the servers at `location`."""
     remote = f"{location}={address[0]}:{address[1]}"
     return self.start(
-      backplane, "mpf-router", "--backplane", backplane, "--remote", remote, "--plain", *options
+      backplane,
+      "mpf-router",
+      "--backplane",
+      backplane,
+      "--remote",
+      remote,
+      "--plain",
+      *patient(options),
     )
 
   def call(self, backplane, *arguments):
