@@ -20,7 +20,6 @@
 #include <signal.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <memory>
@@ -119,12 +118,6 @@ class RouterPair {
   static std::unique_ptr<RouterProcess> started(Options options, const Options& more,
                                                 const RouterProcess::Enter& enter) {
     options.insert(options.end(), more.begin(), more.end());
-    // On a busy host, a router may get no processor for seconds. Only tests that set these times
-    // themselves check them.
-    if (std::ranges::find(more, "--dead-time") == more.end())
-      options.insert(options.end(), {"--dead-time", "60s"});
-    if (std::ranges::find(more, "--handshake-time") == more.end())
-      options.insert(options.end(), {"--handshake-time", "60s"});
     return std::make_unique<RouterProcess>(options, enter);
   }
   TestBackplane near_;

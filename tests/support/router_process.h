@@ -12,6 +12,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <functional>
@@ -33,8 +34,8 @@ class RouterProcess {
   // Runs in the new process before it executes mpf-router: sets limits, enters namespaces.
   using Enter = std::function<void()>;
 
-  // Starts the router with these options, and waits until it is ready. listening() returns the
-  // addresses at which it listens.
+  // Starts the router with these options or with a file, its name first, and waits until it is
+  // ready. listening() returns the addresses at which it listens.
   explicit RouterProcess(const std::vector<std::string>& options, const Enter& enter = {})
       : said_(checkCall(::memfd_create("stderr", MFD_CLOEXEC), "memfd_create")) {
     std::array<int, 2> pipe{};
@@ -43,6 +44,7 @@ class RouterProcess {
     FileDescriptor told(pipe[1]);
     std::vector<std::string> words{MPF_TEST_ROUTER};
     words.insert(words.end(), options.begin(), options.end());
+    if (options.front().starts_with("--")) addPatience(words);
     words.insert(words.end(), {"--ready-fd", std::to_string(kReadyFd)});
     std::vector<char*> argv;
     for (auto& word : words) argv.push_back(word.data());
@@ -107,6 +109,12 @@ class RouterProcess {
   }
 
  private:
+  // On a busy host, a router may get no processor for seconds. Only tests that set these times
+  // themselves, also in a file, check them.
+  static void addPatience(std::vector<std::string>& words) {
+    for (const auto* const time : {"--dead-time", "--handshake-time"})
+      if (std::ranges::find(words, time) == words.end()) words.insert(words.end(), {time, "60s"});
+  }
   static constexpr int kReadyFd = 3;
   FileDescriptor said_;
   pid_t pid_ = 0;

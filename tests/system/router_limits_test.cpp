@@ -132,7 +132,7 @@ class RouterFewDescriptorsTest : public RouterLimitsTest,
 INSTANTIATE_TEST_SUITE_P(Of, RouterFewDescriptorsTest, testing::Values(48, 49));
 
 TEST_P(RouterFewDescriptorsTest, CallersBeyondTheLimitOfFilesWaitUntilOthersHangUp) {
-  startAll({"--dead-time", "60s"});
+  startAll();
   expectAnswer();  // both routers now have all descriptors that this needs
   std::vector<FileDescriptor> callers;
   routers_.farRouter().stop();
@@ -155,7 +155,7 @@ class RouterFewFilesTest : public RouterLimitsTest {
   using RouterLimitsTest::RouterLimitsTest;
   // `limited`: the router that reports the limit.
   void expectThatOthersGoOnAndAllGetInLater(RouterProcess& (RouterPair::*limited)()) {
-    startAll({"--dead-time", "60s"});
+    startAll();
     expectAnswer();  // both routers now have all descriptors that this needs
     for (int i = 0; i < kServers; ++i) {
       const auto name = "server" + std::to_string(100 + i);

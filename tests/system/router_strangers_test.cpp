@@ -72,8 +72,7 @@ TEST_F(RouterStrangersTest, ACallerWithTlsIsToldThatThePortIsPlain) {
 
 // More callers than the limit of connections, from the same host.
 TEST_F(RouterStrangersTest, CallersThatDoNotGreetMakeRoomForAPeer) {
-  const auto far = listen(
-      {"--plain", "--max-connections", "10", "--dead-time", "60s", "--handshake-time", "60s"});
+  const auto far = listen({"--plain", "--max-connections", "10"});
   std::vector<std::unique_ptr<RoguePeer>> idlers;
   for (int i = 0; i < 50; ++i) idlers.push_back(std::make_unique<RoguePeer>(port_.address()));
 
