@@ -109,12 +109,17 @@ TEST_F(GpibBusTest, NothingComesBetweenAWriteAndItsRead) {
 
 TEST_F(GpibBusTest, AnInstrumentThatHangsDelaysOthersUntilItsDeadlineOnly) {
   fake_.hang({5});
-  std::thread hanging([&] {
-    EXPECT_EQ(bus_.write({5}, bytesOf("x"), Deadline::after(50ms)).status, GpibStatus::timeout);
-  });
+  EXPECT_EQ(bus_.write({5}, bytesOf("x"), Deadline::after(5ms)).status, GpibStatus::timeout);
+  EXPECT_TRUE(write("y").ok());
+}
+
+TEST_F(GpibBusTest, OthersWaitForTheBusUntilTheirOwnDeadline) {
+  fake_.hang({5});
+  std::thread hanging([&] { EXPECT_EQ(write("x", {5}).status, GpibStatus::timeout); });
   fake_.waitForHanging();
 
   const auto impatient = bus_.write({22}, bytesOf("y"), Deadline::after(1ms));
+  fake_.letGo();
   const auto patient = write("z");
 
   EXPECT_EQ(impatient.status, GpibStatus::timeout);
