@@ -66,7 +66,9 @@ class RouterTest : public testing::Test {
   void expectAnswer() {
     runUntil([&] { return caller_->isConnected(); });
     caller_->send(Int32Message({.value = ++value_}));
-    EXPECT_EQ(next().tryAs<Int32>()->value, value_);
+    const auto answer = next();
+    ASSERT_EQ(answer.getType(), MessageType::int32) << "the end of the request is a fate";
+    EXPECT_EQ(answer.tryAs<Int32>()->value, value_);
   }
   // The server sends each request back and records its number (numberOf), so that nothing is
   // delivered twice.
