@@ -107,13 +107,19 @@ def test_a_request_that_the_server_refuses_is_refused(silent: Silent) -> None:
             request.wait()
 
 
+def stop(process: subprocess.Popen[str]) -> None:
+    """Stops the process; after the return it does not run."""
+    process.send_signal(signal.SIGSTOP)
+    os.waitpid(process.pid, os.WUNTRACED)
+
+
 def test_a_request_whose_server_dies_has_an_unknown_outcome(
     start: Callable[..., subprocess.Popen[str]],
 ) -> None:
     process = start(PROGRAMS / "mpf-int32-server")
     with mpf.Client("Int32") as client:
         client.int32(timeout=PATIENCE)
-        process.send_signal(signal.SIGSTOP)
+        stop(process)
         request = client.send(mpf.Int32(), timeout=PATIENCE)
         process.kill()
 
@@ -127,7 +133,7 @@ def test_a_request_that_no_server_takes_expires(
     process = start(PROGRAMS / "mpf-int32-server")
     with mpf.Client("Int32") as client:
         client.int32(timeout=PATIENCE)
-        process.send_signal(signal.SIGSTOP)
+        stop(process)
 
         with pytest.raises(mpf.Expired, match="nothing was done"):
             client.int32(timeout=0.05)

@@ -72,7 +72,7 @@ TEST_P(ForeignLockFate, ArrivesAndTheNextServerUsesTheName) {
   client.bind("echo", 0);
   run([&] { return client.isConnected(); });
   waitForLock(serversFile());
-  server.signal(SIGSTOP);
+  server.stop();
   ASSERT_EQ(client.send(Int32Message({.value = 1})), SendResult::sent);
 
   server.end(SIGKILL);

@@ -131,7 +131,7 @@ class AsClientRouter(PeerCase):
     server = self.serve()
     router, client = self.opened()
     router.awaitEnd(client.ask(message("int32")))
-    server.send_signal(signal.SIGSTOP)
+    self.programs.pause(server)
     expiring = client.ask(message("int32"), takeWithinNs=1_000_000)
 
     self.assertEqual(router.awaitEnd(expiring)[:2], ("fate", "expired"))
@@ -170,7 +170,7 @@ class AsClientRouter(PeerCase):
     server = self.serve()
     router, client = self.opened()
     router.awaitEnd(client.ask(message("int32")))
-    server.send_signal(signal.SIGSTOP)
+    self.programs.pause(server)
     asked = [client.ask(message("int32")) for _ in range(3)]
     router.awaitPong(1)
 

@@ -91,6 +91,11 @@ class Programs:
     out, error = call.communicate()
     return (json.loads(out) if out.startswith("{") else out), error, call.returncode
 
+  def pause(self, program):
+    """Sends SIGSTOP; after the return the program does not run."""
+    program.send_signal(signal.SIGSTOP)
+    os.waitpid(program.pid, os.WUNTRACED)
+
   def stop(self, program):
     program.send_signal(signal.SIGCONT)
     program.terminate()

@@ -200,7 +200,7 @@ class AsServerRouter(PeerCase):
     self.server.answer = answer
     client = self.follow("int32", stdout=subprocess.DEVNULL)
     self.far.await_(lambda: any(session.untaken() for session in self.far.sessions))
-    client.send_signal(signal.SIGSTOP)
+    self.programs.pause(client)
 
     self.far.resume(self.server)
 
