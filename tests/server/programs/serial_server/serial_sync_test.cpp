@@ -23,9 +23,11 @@ constexpr int kClients = 10;
 
 // ---- a fickle instrument
 
+constexpr int kUsualQuestions = 1200;
+
 int questionsToAsk() {
   const char* set = std::getenv("MPF_TEST_QUESTIONS");
-  return set != nullptr ? std::atoi(set) : 1200;
+  return set != nullptr ? std::atoi(set) : kUsualQuestions;
 }
 
 struct Outcome {
@@ -60,8 +62,8 @@ class FickleInstrumentTest : public testing::TestWithParam<bool> {};
 
 // MPF_TEST_QUESTIONS=100000 sends more.
 TEST_P(FickleInstrumentTest, NoQuestionGetsAnAnswerToAnother) {
-  const Watchdog watchdog("fickle instrument test",
-                          std::chrono::seconds(120 + questionsToAsk() / 50));
+  const std::chrono::seconds more((questionsToAsk() - kUsualQuestions) / 50);
+  const Watchdog watchdog("fickle instrument test", Watchdog::kPatience + more);
   const LineLimits limits{.settleTime = 1ms, .quietTime = 2ms, .resyncLimit = 6ms};
   MoodCounts moods{};
   TestBackplane backplane;
