@@ -103,13 +103,14 @@ TEST_F(ReportTest, ReportsADeadServerAsDead) {
 TEST_F(ReportTest, ReportsAStoppedProcessAsStopped) {
   Victim victim("serve", backplane_.name());
   ASSERT_EQ(victim.line(), "open");
+  // After an answer it handles SIGTERM, too.
+  ASSERT_TRUE(SyncClient(backplane_, "echo").call(Float64Message(), 10min));
 
-  victim.signal(SIGSTOP);
-  int status = 0;
-  ASSERT_EQ(::waitpid(victim.pid(), &status, WUNTRACED), victim.pid());
+  victim.stop();
 
   EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "stopped");
   victim.signal(SIGCONT);
+  int status = 0;
   ASSERT_EQ(::waitpid(victim.pid(), &status, WCONTINUED), victim.pid());
   EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "alive");
   EXPECT_EQ(victim.end(SIGTERM), 0);
