@@ -28,6 +28,8 @@ constexpr std::size_t kMoreHeapKiB = SIZE_MAX / 2;  // a sanitizer keeps what wa
 constexpr std::size_t kMoreHeapKiB = 16 * 1024UL;
 #endif
 constexpr std::uint64_t kWarmUp = 20;  // rounds
+// For a condition that a mistake prevents. Without it, the condition becomes true, however late.
+constexpr std::chrono::duration<double> kPatienceIfBroken{8};
 
 std::string statusText(int status) {
   if (WIFSIGNALED(status)) return fmt::format("was killed by signal {}", WTERMSIG(status));
@@ -63,7 +65,10 @@ Cast Referee::cast() {
   return {*world_, backplane_.name(), static_cast<std::uint32_t>(random_()), options_.sabotage};
 }
 
-void Referee::waitFor(const std::string& what, const Condition& condition) {
+void Referee::waitFor(const std::string& what, const Condition& condition, Sabotage brokenBy) {
+  auto patience = options_.patience;
+  if (brokenBy != Sabotage::none && brokenBy == options_.sabotage)
+    patience = std::min(patience, kPatienceIfBroken);
   Nanoseconds waited{0};
   while (!condition()) {
     const auto sinceNs = Clock::nowNs();
@@ -72,9 +77,8 @@ void Referee::waitFor(const std::string& what, const Condition& condition) {
     // Counts at most the requested interval: when the processors are so busy that this process
     // waits for one, the actors are not to blame for the delay.
     waited += std::min<Nanoseconds>(Nanoseconds(Clock::nowNs() - sinceNs), kPollInterval);
-    if (waited >= options_.patience)
-      throw Broken(
-          fmt::format("this did not happen within {} s: {}", options_.patience.count(), what));
+    if (waited >= patience)
+      throw Broken(fmt::format("this did not happen within {} s: {}", patience.count(), what));
   }
 }
 
@@ -226,13 +230,17 @@ void Referee::settle() {
   waitFor("the survivors continue", [&] { return repliesOf(0) - steadyReplies >= kEnough; });
   awaitSuccessor();
   survivor.rest.store(1);
-  waitFor("each request has an end", [&] { return survivor.isAtRest.load() != 0; });
+  waitFor(
+      "each request has an end", [&] { return survivor.isAtRest.load() != 0; }, Sabotage::loseFate);
   std::vector<std::string> stale;
   try {
-    waitFor("nothing stale is left", [&] {
-      static_cast<void>(Backplane::named(backplane_.name()).removeDead());
-      return (stale = staleSegments(backplane_.name(), kLinksAtRest)).empty();
-    });
+    waitFor(
+        "nothing stale is left",
+        [&] {
+          static_cast<void>(Backplane::named(backplane_.name()).removeDead());
+          return (stale = staleSegments(backplane_.name(), kLinksAtRest)).empty();
+        },
+        Sabotage::stale);
   } catch (const Broken& broken) {
     throw Broken(fmt::format("{}; still there: {}", broken.what(), fmt::join(stale, ", ")));
   }
@@ -256,7 +264,8 @@ void Referee::checkHoldings() {
              now.mappings <= first.mappings + kMoreMappings &&
              now.heapKiB <= first.heapKiB + kMoreHeapKiB;
     };
-    waitFor("the survivors hold no more resources than in the first rounds", isFlat);
+    waitFor("the survivors hold no more resources than in the first rounds", isFlat,
+            Sabotage::leak);
   }
 }
 

@@ -82,7 +82,9 @@ class Referee {
 
  private:
   using Condition = std::function<bool()>;
-  void waitFor(const std::string& what, const Condition& condition);
+  // `brokenBy`: the mistake after which this condition does not become true.
+  void waitFor(const std::string& what, const Condition& condition,
+               Sabotage brokenBy = Sabotage::none);
   [[nodiscard]] Cast cast();
   void layOutCorpse();
   void startMortal();

@@ -145,13 +145,13 @@ TEST_P(MistakeTest, IsFound) {
 
 INSTANTIATE_TEST_SUITE_P(
     Each, MistakeTest,
-    testing::Values(Mistake{"lose-fate", "8", "each request has an end"},
+    testing::Values(Mistake{"lose-fate", "600", "each request has an end"},
                     // The slot contains invalid data or an old request; the complaint depends on
                     // which.
                     Mistake{"half-message", "30", ""},
                     Mistake{"keep-name", "30", "the successor could not open the name"},
-                    Mistake{"stale", "8", "nothing stale is left; still there: mpf."},
-                    Mistake{"leak", "8", "the survivors hold no more resources"}),
+                    Mistake{"stale", "600", "nothing stale is left; still there: mpf."},
+                    Mistake{"leak", "600", "the survivors hold no more resources"}),
     [](const auto& mistake) {
       auto name = mistake.param.name;
       name.erase(name.find('-') == std::string::npos ? name.size() : name.find('-'), 1);
