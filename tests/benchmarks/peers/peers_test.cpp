@@ -17,6 +17,7 @@ void expectToAnswer(const PeerFamily& family, Mode mode, std::size_t bytes) {
   const auto cpus = allowedCpus();
   Workload workload;
   workload.stopsByItself = true;
+  workload.grace = std::chrono::minutes(10);
   workload.server = [peer](const RunContext& context) { peer->serve(context); };
   workload.requester = [peer](const RunContext& context) {
     peer->connect(context);

@@ -38,7 +38,7 @@ std::string exchange(const std::shared_ptr<Peer>& peer, int window) {
   const SharedObject<std::atomic<bool>> hasServed;
   Workload workload;
   workload.stopsByItself = true;
-  workload.stopGrace = std::chrono::minutes(1);
+  workload.stopGrace = workload.grace = std::chrono::minutes(10);
   workload.scratchBytes = kBareScratchBytes;
   workload.server = [&](const RunContext& context) {
     peer->serve(context);
@@ -124,6 +124,7 @@ TEST_F(NamespacesTest, ContainNoProcessAfterTheRunnerIsKilled) {
   const int runner = forkProcess([&] {
     const auto between = Surroundings::namespaces();
     Workload workload;
+    workload.grace = std::chrono::minutes(10);
     workload.server = [&](const RunContext& context) {
       between.enterServer();
       context.ready();
