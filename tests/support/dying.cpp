@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Tests that die, each in another way. guard_test.cpp runs them. Each prints the names of its
 // resources, on each line a word and a value.
+#include <sched.h>
 #include <signal.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <fstream>
 #include <gtest/gtest.h>
 #include <iostream>
+#include <iterator>
 #include <string>
 #include <thread>
 
@@ -48,10 +52,20 @@ class DyingTest : public testing::Test {
   pid_t child_ = 0;
 };
 
+// Whether this thread of the process exists and sleeps.
+bool isAsleep(pid_t thread) {
+  std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
+  const std::string stat{std::istreambuf_iterator<char>(file), {}};
+  return stat.find(") S ") != std::string::npos;
+}
+
 TEST_F(DyingTest, Hangs) {
-  const std::jthread other([] {
+  std::atomic<pid_t> id{0};
+  const std::jthread other([&] {
+    id = ::gettid();
     for (;;) ::pause();
   });
+  while (!isAsleep(id)) ::sched_yield();  // the test expects it in pause()
   const Watchdog watchdog("a test that", std::chrono::seconds(1));
   for (;;) ::pause();
 }
