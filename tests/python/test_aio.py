@@ -102,8 +102,13 @@ async def test_a_cancelled_task_cancels_its_request(silent: Silent, backplane: s
 
 async def test_asyncio_timeouts_work(silent: Silent) -> None:
     async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
+        calling = asyncio.ensure_future(client.call(mpf.Int32()))
+        await silent[2].wait()
         with pytest.raises(asyncio.TimeoutError):
-            await asyncio.wait_for(client.call(mpf.Int32()), 0.01)
+            await asyncio.wait_for(calling, 0.01)
+
+        assert calling.cancelled()
+        assert not client._waiting
 
 
 async def test_closing_ends_calls(silent: Silent) -> None:
