@@ -242,7 +242,12 @@ TEST_F(CallTest, ARequestWithoutAReplyInTimeHasAFate) {
     server.on<Int32>([&](Int32Message&& request) { kept_.push_back(std::move(request)); });
   });
 
-  const auto ended = run({"call", "special", "int32", "--timeout", "0.5"});
+  Ended ended;
+  auto timeout = 0.5;
+  do {
+    ended = run({"call", "special", "int32", "--timeout", std::to_string(timeout)});
+    timeout *= 2;
+  } while (ended.err.starts_with("mpf call: not sent: not connected: "));
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(
@@ -250,8 +255,8 @@ TEST_F(CallTest, ARequestWithoutAReplyInTimeHasAFate) {
       testing::AnyOf(
           StartsWith("mpf call: no reply: outcomeUnknown (the server received the request, but did "
                      "not reply in time"),
-          StartsWith("mpf call: no reply: expired (the server did not receive the request in time"),
-          StartsWith("mpf call: not sent: not connected: ")));
+          StartsWith(
+              "mpf call: no reply: expired (the server did not receive the request in time")));
 }
 
 TEST_F(CallTest, CountsTheReasonsOfFailedCalls) {
