@@ -10,13 +10,13 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstring>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <mpf/clock.h>
 
 #include "base/printable.h"
+#include "base/signal_name.h"
 #include "base/system_call.h"
 #include "crate/capsule/core_file.h"
 #include "crate/capsule/link_record.h"
@@ -127,10 +127,8 @@ Tree describe(const Cause& cause) {
   Tree tree{{"kind", toString(cause.kind)}};
   if (cause.kind == CauseKind::exit) tree["status"] = cause.number;
   if (cause.kind != CauseKind::signal) return tree;
-  const auto* const name = ::sigabbrev_np(cause.number);
   tree["signal"] = cause.number;
-  tree["name"] =
-      name == nullptr ? fmt::format("signal {}", cause.number) : fmt::format("SIG{}", name);
+  tree["name"] = signalName(cause.number);
   return tree;
 }
 

@@ -4,11 +4,11 @@
 #include <sys/wait.h>
 
 #include <algorithm>
-#include <cstring>
 #include <fmt/format.h>
 
 #include "base/duration_text.h"
 #include "base/run_main.h"
+#include "base/signal_name.h"
 
 namespace mpf::crate {
 namespace {
@@ -39,7 +39,7 @@ const char* toString(ServiceState state) noexcept {
 
 std::string ProcessEnd::text() const {
   if (!waitStatus) return "ended (exit status unknown: an earlier supervisor started it)";
-  if (WIFSIGNALED(*waitStatus)) return fmt::format("SIG{}", ::sigabbrev_np(WTERMSIG(*waitStatus)));
+  if (WIFSIGNALED(*waitStatus)) return signalName(WTERMSIG(*waitStatus));
   return fmt::format("exit status {}", WEXITSTATUS(*waitStatus));
 }
 

@@ -14,6 +14,7 @@
 #include "base/duration_text.h"
 #include "base/print_error.h"
 #include "base/service_manager.h"
+#include "base/signal_name.h"
 #include "base/system_call.h"
 #include "crate/supervisor/child_process.h"
 
@@ -118,18 +119,6 @@ void Supervisor::apply(const std::vector<ProcessPlan>& plans) {
   members_ = std::move(fresh);
 }
 
-void Supervisor::reload() try {
-  ServiceManager::notifyReloading();
-  auto fresh = load_();
-  apply(planProcesses(fresh, folder_.path().string()));
-  crate_ = std::move(fresh);
-  printError("mpf run: reloaded {}\n", crate_.file);
-  ServiceManager::notifyReady();
-} catch (...) {
-  ServiceManager::notifyReady();
-  throw;
-}
-
 void Supervisor::beginShutdown() {
   if (isShuttingDown_) {  // the second signal: at once
     for (const auto& member : members_) signal(*member, SIGKILL);
@@ -213,7 +202,7 @@ void Supervisor::start(Member& member) {
 void Supervisor::signal(Member& member, int number) {
   const auto& service = member.service;
   if (!service.isRunning()) return;
-  log(service, fmt::format("{}; SIG{}", service.reason(), ::sigabbrev_np(number)));
+  log(service, fmt::format("{}; {}", service.reason(), signalName(number)));
   sendSignal(service.pid(), member.adopted, number);
 }
 
@@ -231,7 +220,7 @@ void Supervisor::handleSignals() {
         }
         break;
       default:
-        printError("mpf run: SIG{}: stopping\n", ::sigabbrev_np(*number));
+        printError("mpf run: {}: stopping\n", signalName(*number));
         beginShutdown();
         break;
     }

@@ -7,6 +7,8 @@
 
 #include <mpf/clock.h>
 
+#include "base/print_error.h"
+#include "base/service_manager.h"
 #include "crate/supervisor/service_json.h"
 #include "crate/supervisor/supervisor.h"
 
@@ -24,6 +26,18 @@ nlohmann::json Supervisor::answer(const nlohmann::json& request) {
   else throw std::runtime_error(fmt::format("unknown request \"{}\"", what));
   tryRecord();
   return nlohmann::json::object();
+}
+
+void Supervisor::reload() try {
+  ServiceManager::notifyReloading();
+  auto fresh = load_();
+  apply(planProcesses(fresh, folder_.path().string()));
+  crate_ = std::move(fresh);
+  printError("mpf run: reloaded {}\n", crate_.file);
+  ServiceManager::notifyReady();
+} catch (...) {
+  ServiceManager::notifyReady();
+  throw;
 }
 
 // The member that a request names.

@@ -269,6 +269,7 @@ TEST_F(ServiceTest, AnAdoptedProcessKeepsItsAge) {
 TEST(ProcessEnd, HasAText) {
   EXPECT_EQ(exited(3).text(), "exit status 3");
   EXPECT_EQ(killedBy(SIGSEGV).text(), "SIGSEGV");
+  EXPECT_EQ(killedBy(SIGRTMIN).text(), "signal 34") << "a real-time signal has no name";
   EXPECT_THAT(ProcessEnd().text(), HasSubstr("unknown"));
   EXPECT_TRUE(killedBy(SIGSEGV).isBySignal());
   EXPECT_FALSE(exited(0).isBySignal());
