@@ -2,6 +2,7 @@
 #include "crate/capsule/capsule_store.h"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -26,17 +27,28 @@ std::string freshName(const nlohmann::ordered_json& capsule) {
                      capsule.value("pid", 0), kEnding);
 }
 
+// Writes a file that gets its name when it is complete. After a failure its part is removed: on a
+// full disk, parts would take the space that becomes free.
+void writeWhole(const std::string& path, const std::string& text) {
+  const auto fresh = path + ".new";
+  try {
+    OutputFile file(fresh, 0600);
+    file.write(text);
+    file.close();
+    checkCall(std::rename(fresh.c_str(), path.c_str()), "rename", path);
+  } catch (...) {
+    ::unlink(fresh.c_str());
+    throw;
+  }
+}
+
 }  // namespace
 
 std::string CapsuleStore::add(const nlohmann::ordered_json& capsule) const {
   if (::mkdir(folder_.c_str(), 0700) != 0 && errno != EEXIST)
     throwSystemError(errno, "create", folder_.string());
   const auto path = (folder_ / freshName(capsule)).string();
-  const auto fresh = path + ".new";
-  OutputFile file(fresh, 0600);
-  file.write(capsule.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  file.close();
-  checkCall(std::rename(fresh.c_str(), path.c_str()), "rename", path);
+  writeWhole(path, capsule.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   prune();
   return path;
 }

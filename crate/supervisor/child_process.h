@@ -4,7 +4,8 @@
 //   fork ─► child waits at the gate ─► the supervisor records its pid ─► open() ─► exec
 //
 // A supervisor that is killed before open() closes the gate with its end: the child then exits
-// without having run the program. Therefore each program that runs is in the record.
+// without having run the program. Therefore each program that runs is in the record, except while
+// the record cannot be written, for example because the disk is full.
 //
 // Threads  the process must have one thread: it forks.
 #pragma once

@@ -188,7 +188,7 @@ void Supervisor::start(Member& member) {
     service.started(child.pid(), child.startTicks(), Clock::nowNs());
     capsuleWriter_.watch(service);
     nextLookNs_ = 0;
-    record();
+    tryRecord();
     if (const auto why = child.open(); !why.empty())
       throw std::runtime_error(
           fmt::format("{} in {}: {}", plan.command.front(), plan.workingFolder, why));

@@ -2,9 +2,12 @@
 // CapsuleStore: limits by number and size, and rights.
 #include "crate/capsule/capsule_store.h"
 
+#include <signal.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <gtest/gtest.h>
+#include <system_error>
 
 #include "tests/support/temporary_folder.h"
 
@@ -36,6 +39,21 @@ TEST(CapsuleStore, RemovesTheOldestAboveTheSizeButKeepsTheNewest) {
   const auto second = store.add(kCapsule);
 
   EXPECT_EQ(store.list(), std::vector{second});
+}
+
+TEST(CapsuleStore, AFailedWriteLeavesNoFile) {
+  const mpf::test::TemporaryFolder files;
+  const CapsuleStore store(files.path());
+  static_cast<void>(::signal(SIGXFSZ, SIG_IGN));
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit little{10, before.rlim_max};  // bytes of each file, as on a full disk
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &little), 0);
+
+  EXPECT_THROW(store.add(kCapsule), std::system_error);
+
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_TRUE(std::filesystem::is_empty(files.path()));
 }
 
 }  // namespace
