@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 
 #include <mpf/file_descriptor.h>
@@ -27,6 +28,7 @@ std::optional<ProcessStat> ProcessStat::tryReadFile(const char* path) noexcept {
   const FileDescriptor file(::open(path, O_RDONLY | O_CLOEXEC));
   ProcessStat stat;
   const auto got = file ? ::read(file.get(), stat.text_.data(), stat.text_.size()) : -1;
+  if (got == 0) errno = ESRCH;
   if (got <= 0) return std::nullopt;
   stat.length_ = static_cast<std::size_t>(got);
   return stat;

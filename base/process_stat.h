@@ -20,7 +20,8 @@ class ProcessStat {
   static constexpr int kSystemTicks = 15;
   static constexpr int kStartTicks = 22;
 
-  // nullopt when there is no such process, or /proc does not show it.
+  // nullopt when there is no such process, /proc does not show it (errno ENOENT or ESRCH), or the
+  // file cannot be read (other values of errno).
   static std::optional<ProcessStat> tryRead(pid_t pid) noexcept;
   // This process, also where /proc belongs to another pid namespace.
   static std::optional<ProcessStat> tryReadOwn() noexcept;

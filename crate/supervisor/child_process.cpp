@@ -13,6 +13,7 @@
 #include <grp.h>
 #include <pwd.h>
 #include <stdexcept>
+#include <system_error>
 #include <vector>
 
 #include <mpf/clock.h>
@@ -140,6 +141,8 @@ void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number) {
 
 std::uint64_t startTicksOf(pid_t pid) {
   const auto stat = ProcessStat::tryRead(pid);
+  if (!stat && errno != ENOENT && errno != ESRCH)
+    throw std::system_error(errno, std::generic_category(), fmt::format("read /proc/{}/stat", pid));
   return stat && !stat->hasEnded() ? stat->number(ProcessStat::kStartTicks) : 0;
 }
 

@@ -41,14 +41,17 @@ class ChildProcess {
   FileDescriptor failure_;  // errno of exec; the end of file when it succeeded
 };
 
-// A descriptor that becomes readable when the process ends; empty: there is no such process.
+// A descriptor that becomes readable when the process ends; empty: there is no such process, or no
+// descriptor is free, or the kernel has no pidfd_open().
 [[nodiscard]] FileDescriptor openPidfd(pid_t pid);
 // Sends a signal through the descriptor, if it is open: the process may have ended, and its pid may
-// be in use again. Otherwise `pid` is a child that has not been reaped.
+// be in use again. Otherwise `pid` is a child that has not been reaped, or an adopted process
+// that ran at the last look.
 void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number);
 
 // The start time of a process since boot, which identifies it together with its pid; 0: there is no
 // such process, or it is a zombie.
+//   throws  std::system_error if that cannot be found out, for example without a free descriptor
 [[nodiscard]] std::uint64_t startTicksOf(pid_t pid);
 // The same time as CLOCK_MONOTONIC [ns], without the times in which the host was suspended.
 [[nodiscard]] std::int64_t startNsOf(std::uint64_t startTicks);

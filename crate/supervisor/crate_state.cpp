@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "crate/supervisor/crate_state.h"
 
+#include <cerrno>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -26,7 +27,9 @@ CrateState CrateState::read(const std::string& path) try {
                                one.at("restarts"), one.at("command"), one.at("isStopRequested")});
   }
   return state;
-} catch (const std::system_error&) {
+} catch (const std::system_error& error) {
+  // The processes may run: without them, a second one of each would be started.
+  if (error.code().value() == EMFILE || error.code().value() == ENFILE) throw;
   return {};
 } catch (const nlohmann::json::exception&) {
   return {};

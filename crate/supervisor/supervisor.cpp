@@ -71,8 +71,8 @@ void Supervisor::takeOver() {
   for (const auto& recorded : CrateState::read(folder_.file("state.json")).processes) {
     auto* member = find(recorded.name);
     auto pidfd = openPidfd(recorded.pid);
-    const bool isAlive = pidfd.get() >= 0 && startTicksOf(recorded.pid) == recorded.startTicks;
-    if (!isAlive) {
+    const auto startTicks = startTicksOf(recorded.pid);
+    if (startTicks == 0 || startTicks != recorded.startTicks) {  // it has ended
       if (member != nullptr && recorded.isStopRequested)
         member->service.requestStop(Clock::nowNs());
       continue;
@@ -84,6 +84,7 @@ void Supervisor::takeOver() {
       member->isRemoved = true;
     }
     auto& service = member->service;
+    member->isAdopted = true;
     member->adopted = std::move(pidfd);
     member->isNotified = true;
     service.adopted(recorded.pid, recorded.startTicks, recorded.restarts, Clock::nowNs(),
@@ -184,7 +185,6 @@ void Supervisor::start(Member& member) {
   try {
     ChildProcess child(plan, folder_.log(plan.name), notify_.name());
     member.isNotified = false;
-    member.adopted.reset();
     service.started(child.pid(), child.startTicks(), Clock::nowNs());
     capsuleWriter_.watch(service);
     nextLookNs_ = 0;
@@ -243,6 +243,7 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   auto& service = member.service;
   const auto pid = service.pid();
   const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
+  member.isAdopted = false;
   member.adopted.reset();
   attempt([&] { capsuleWriter_.look(); });
   const auto capsule = capsuleWriter_.collect(service, end);
@@ -261,8 +262,18 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
         fmt::format("failed: {}; `mpf logs {}` shows why", service.reason(), service.plan().name));
 }
 
+// Finds out which adopted processes without a pidfd have ended.
+void Supervisor::lookForEnds() {
+  for (const auto& member : members_) {
+    const auto& service = member->service;
+    if (!member->isAdopted || member->adopted) continue;
+    if (startTicksOf(service.pid()) != service.startTicks()) handleEnd(*member, {});
+  }
+}
+
 // Finds out which processes are ready, and which are stalled.
 void Supervisor::look() {
+  attempt([&] { lookForEnds(); });
   attempt([&] {
     for (auto& [backplane, watch] : watches_) watch.look();
     capsuleWriter_.look();

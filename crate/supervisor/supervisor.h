@@ -50,7 +50,8 @@ class Supervisor {
   struct Member {  // a service with what the supervisor holds for it
     explicit Member(ProcessPlan plan) : service(std::move(plan)) {}
     Service service;
-    FileDescriptor adopted;  // pidfd of a process that is not a child
+    bool isAdopted = false;  // its process is not a child
+    FileDescriptor adopted;  // pidfd of that process, if it could be opened
     bool isNotified = false;  // it has reported that it is ready
     bool isRemoved = false;  // no longer in the crate: forgotten when it has ended
   };
@@ -65,6 +66,7 @@ class Supervisor {
   void handleSignals();
   void reapChildren();
   void handleEnd(Member& member, const ProcessEnd& end);
+  void lookForEnds();
   void look();
   [[nodiscard]] bool isReady(const Member& member) const;
   void takeReports();

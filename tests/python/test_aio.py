@@ -166,24 +166,27 @@ async def test_a_subscription_is_renewed(doubler: mpf.Server) -> None:
     assert before == after == [1, 2]
 
 
-async def test_another_task_may_close_a_subscription(silent: Silent) -> None:
+@pytest.mark.parametrize("hasReply", [False, True])
+async def test_another_task_may_close_a_subscription(silent: Silent, hasReply: bool) -> None:
+    server, requests, came = silent
     async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
         replies = client.subscribe(mpf.Int32())
+        received: list[int] = []
 
-        async def values() -> list[int]:
-            return [reply.value async for reply in replies]
+        async def receive() -> None:
+            async for reply in replies:
+                received.append(reply.value)
 
-        for hasReply in (False, True):
-            received = asyncio.ensure_future(values())
-            assert await asyncio.to_thread(silent.came.acquire, timeout=PATIENCE)
-            if hasReply:
-                silent.server.reply(silent.requests[-1], mpf.Int32(5))
-                while replies._request is None or replies._request.result(check=False) is None:
-                    await asyncio.sleep(0.001)
-            replies.close()
+        receiving = asyncio.ensure_future(receive())
+        await came.wait()
+        if hasReply:
+            server.reply(requests[0], mpf.Int32(5))
+            while not received:
+                await asyncio.sleep(0)
+        replies.close()
+        await receiving
 
-            assert await received == ([5] if hasReply else [])
-            replies = client.subscribe(mpf.Int32())
+    assert received == ([5] if hasReply else [])
 
 
 async def test_a_thousand_subscriptions_of_one_client() -> None:

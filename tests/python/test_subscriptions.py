@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import concurrent.futures
 import threading
 import time
 from collections.abc import Iterator
@@ -72,18 +71,25 @@ def test_a_subscription_is_renewed_when_the_server_starts_again() -> None:
 
 @pytest.mark.parametrize("hasReply", [False, True])
 def test_another_thread_may_close_a_subscription(silent: Silent, hasReply: bool) -> None:
+    received: list[int] = []
     with mpf.Client("silent", timeout=PATIENCE) as client:
         replies = client.subscribe(mpf.Int32())
-        with concurrent.futures.ThreadPoolExecutor() as threads:
-            received = threads.submit(list, replies)
-            assert silent.came.acquire(timeout=PATIENCE)
-            if hasReply:
-                silent.server.reply(silent.requests[0], mpf.Int32(5))
-                while not replies._request.result(check=False):
-                    time.sleep(0.001)
-            replies.close()
 
-            assert [reply.value for reply in received.result()] == ([5] if hasReply else [])
+        def receive() -> None:
+            for reply in replies:
+                received.append(reply.value)
+
+        receiving = threading.Thread(target=receive)
+        receiving.start()
+        assert silent.came.acquire(timeout=PATIENCE)
+        if hasReply:
+            silent.server.reply(silent.requests[0], mpf.Int32(5))
+            while not received:
+                time.sleep(0)
+        replies.close()
+        receiving.join()
+
+    assert received == ([5] if hasReply else [])
 
 
 def test_further_replies_of_a_request_that_was_sent_again_arrive() -> None:

@@ -14,6 +14,7 @@
 
 #include "base/system_call.h"
 #include "base/whole_file.h"
+#include "tests/support/no_descriptors.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mpf::crate::test {
@@ -97,6 +98,12 @@ TEST(StartTicks, IdentifyAProcess) {
   ASSERT_EQ(::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT), 0);
   EXPECT_EQ(startTicksOf(child), 0U) << "a zombie";
   ::waitpid(child, nullptr, 0);
+}
+
+TEST(StartTicks, AreUnknownWithoutADescriptor) {
+  const mpf::test::NoDescriptors none;
+
+  EXPECT_THROW(static_cast<void>(startTicksOf(::getpid())), std::system_error);
 }
 
 TEST(StartTicks, AreATimeOfTheMonotonicClock) {

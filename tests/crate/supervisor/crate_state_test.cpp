@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/whole_file.h"
+#include "tests/support/no_descriptors.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mpf::crate::test {
@@ -52,6 +53,12 @@ TEST_F(CrateStateTest, ThatIsDamagedCountsAsEmpty) {
   }
   EXPECT_TRUE(CrateState::read(folder_.file("absent")).processes.empty());
   EXPECT_TRUE(CrateState::read(folder_.write("list", "[1]")).processes.empty());
+}
+
+TEST_F(CrateStateTest, ThatCannotBeOpenedForLackOfDescriptorsIsAnError) {
+  const mpf::test::NoDescriptors none;
+
+  EXPECT_THROW(static_cast<void>(CrateState::read(path_)), std::system_error);
 }
 
 }  // namespace

@@ -201,6 +201,21 @@ TEST_F(SupervisorTest, ANewSupervisorTakesOverWhatRuns) {
   EXPECT_TRUE(isReplying("Int32"));
 }
 
+TEST_F(SupervisorTest, TakesOverAndSeesEndsWithoutPidfds) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto one = pidOf("int32");
+
+  killSupervisor();
+  start({"/usr/bin/env", "LD_PRELOAD=" MPF_TEST_NO_PIDFD, MPF, "run", files_.file("lab.toml")});
+  waitForState("int32", "ready");
+  EXPECT_EQ(pidOf("int32"), one);
+  ::kill(one, SIGKILL);
+  waitForNew("int32", one);
+
+  EXPECT_TRUE(isReplying("Int32"));
+}
+
 // The old process of this name was stopped; its successor is another one.
 TEST_F(SupervisorTest, AReplacedProcessIsRestartedAndStoppedAfterATakeOver) {
   run("[[server]]\nname = \"int32\"\nprogram = \"int32\"\nqueue-size = 10\n");
