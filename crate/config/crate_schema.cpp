@@ -11,7 +11,8 @@ using Json = nlohmann::ordered_json;
 Json text() { return {{"type", "string"}}; }
 Json integer() { return {{"type", "integer"}}; }
 Json texts() { return {{"oneOf", {text(), {{"type", "array"}, {"items", text()}}}}}; }
-Json duration() { return {{"type", "string"}, {"pattern", "^([1-9][0-9]*(ms|s|min)|off)$"}}; }
+Json duration() { return {{"type", "string"}, {"pattern", "^[1-9][0-9]*(ms|s|min)$"}}; }
+Json durationOrOff() { return {{"type", "string"}, {"pattern", "^([1-9][0-9]*(ms|s|min)|off)$"}}; }
 Json size() { return {{"type", {"string", "integer"}}, {"pattern", "^[0-9]+(KiB|MiB|GiB)?$"}}; }
 Json variables() {
   return {{"type", "object"},
@@ -41,7 +42,7 @@ Json supervisionKeys() {
   return {{"restart", {{"enum", {"always", "on-failure", "never"}}}},
           {"start-time", duration()},
           {"stop-time", duration()},
-          {"stall-limit", duration()},
+          {"stall-limit", durationOrOff()},
           {"first-pause", duration()},
           {"last-pause", duration()},
           {"max-restarts", {{"type", "integer"}, {"minimum", 0}}},

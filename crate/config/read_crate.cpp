@@ -31,6 +31,17 @@ int parseCount(const std::string& text) {
   return *value;
 }
 
+constexpr const char* kDurationRule =
+    "\"{}\": write a time with its unit, such as 500ms, 2s or 1min{}";
+
+std::optional<milliseconds> tryDuration(std::string_view text) {
+  const auto number = tryTakeNumber<std::int64_t>(text);
+  const std::map<std::string_view, std::int64_t> units{{"ms", 1}, {"s", 1000}, {"min", 60'000}};
+  const auto unit = units.find(text);
+  if (!number || unit == units.end() || *number <= 0 || *number > 10'000'000) return std::nullopt;
+  return milliseconds(*number * unit->second);
+}
+
 // Parses "4096", "64KiB", "4MiB" or "1GiB".
 std::uint64_t parseSize(const std::string& text) {
   const auto unitAt = std::min(text.find_first_not_of("0123456789"), text.size());
@@ -167,7 +178,8 @@ class CrateReader {
     table.readWith("restart", [&](const std::string& text) { to.restart = parseRestart(text); });
     readTime("start-time", to.startTime);
     readTime("stop-time", to.stopTime);
-    readTime("stall-limit", to.stallLimit);
+    table.readWith("stall-limit",
+                   [&](const std::string& text) { to.stallLimit = parseStallLimit(text); });
     readTime("first-pause", to.firstPause);
     readTime("last-pause", to.lastPause);
     table.readWith("max-restarts",
@@ -259,15 +271,14 @@ class CrateReader {
 }  // namespace
 
 milliseconds parseDuration(const std::string& text) {
+  if (const auto duration = tryDuration(text)) return *duration;
+  throw std::invalid_argument(fmt::format(kDurationRule, text, ""));
+}
+
+milliseconds parseStallLimit(const std::string& text) {
   if (text == "off") return milliseconds(0);
-  std::string_view unit = text;
-  const auto number = tryTakeNumber<std::int64_t>(unit);
-  const std::map<std::string_view, std::int64_t> units{{"ms", 1}, {"s", 1000}, {"min", 60'000}};
-  const auto found = units.find(unit);
-  if (!number || found == units.end() || *number <= 0 || *number > 10'000'000)
-    throw std::invalid_argument(
-        fmt::format("\"{}\": write a time with its unit, such as 500ms, 2s or 1min, or off", text));
-  return milliseconds(*number * found->second);
+  if (const auto duration = tryDuration(text)) return *duration;
+  throw std::invalid_argument(fmt::format(kDurationRule, text, ", or off"));
 }
 
 Crate readCrate(const std::string& file) {

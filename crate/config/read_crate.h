@@ -18,8 +18,10 @@ namespace mpf::crate {
 // modules that two processes drive, unknown carriers, missing values.
 void checkCrate(const Crate& crate, ConfigErrors& errors);
 
-// Parses "500ms", "2s", "5min" or "off" (0).
+// Parses "500ms", "2s" or "5min".
 //   throws  std::invalid_argument that shows the form
 [[nodiscard]] std::chrono::milliseconds parseDuration(const std::string& text);
+// The same, or "off" (0).
+[[nodiscard]] std::chrono::milliseconds parseStallLimit(const std::string& text);
 
 }  // namespace mpf::crate

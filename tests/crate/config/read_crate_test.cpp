@@ -178,9 +178,20 @@ TEST(ParseDuration, NeedsAUnit) {
   EXPECT_EQ(parseDuration("500ms"), 500ms);
   EXPECT_EQ(parseDuration("2s"), 2s);
   EXPECT_EQ(parseDuration("3min"), 3min);
-  EXPECT_EQ(parseDuration("off"), 0ms);
-  for (const auto* const text : {"", "5", "s", "0s", "-1s", "1h", "1 s", "99999999999s"})
+  for (const auto* const text : {"", "5", "s", "0s", "-1s", "1h", "1 s", "99999999999s", "off"})
     EXPECT_THROW(static_cast<void>(parseDuration(text)), std::invalid_argument) << text;
+}
+
+TEST_F(ReadCrateTest, OnlyTheStallLimitCanBeOff) {
+  EXPECT_EQ(parseStallLimit("off"), 0ms);
+  EXPECT_EQ(parseStallLimit("2s"), 2s);
+  EXPECT_THAT(errorsOf("[supervision]\nstall-limit = \"5\"\n"),
+              HasSubstr("\"5\": write a time with its unit, such as 500ms, 2s or 1min, or off\n"));
+  for (const std::string key :
+       {"start-time", "stop-time", "first-pause", "last-pause", "restart-window"})
+    EXPECT_THAT(errorsOf("[supervision]\n" + key + " = \"off\"\n"),
+                HasSubstr(key + ": \"off\": write a time with its unit, such as 500ms, 2s or "
+                                "1min\n"));
 }
 
 }  // namespace
