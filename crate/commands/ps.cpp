@@ -2,14 +2,18 @@
 // mpf ps: the processes of the crates that run. mpf logs: what a process has printed.
 #include <fcntl.h>
 #include <sys/inotify.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <fmt/format.h>
 #include <fstream>
+#include <limits>
 #include <memory>
 
+#include "base/command_line.h"
 #include "base/duration_text.h"
 #include "base/printable.h"
 #include "base/process_stat.h"
@@ -18,6 +22,7 @@
 #include "crate/commands/commands.h"
 #include "crate/commands/control.h"
 #include "crate/supervisor/control_protocol.h"
+#include "crate/supervisor/log_follower.h"
 #include "tools/text/json_text.h"
 #include "tools/text/table.h"
 
@@ -95,14 +100,21 @@ struct LogArguments {
 // The last lines of a log; the beginning of a log may be a hole.
 std::string lastLines(const std::string& text, int lines) {
   auto begin = text.size();
-  for (int i = 0; i <= lines && begin != 0; ++i) {
-    const auto end = begin == text.size() && text.ends_with('\n') ? begin - 1 : begin;
-    const auto at = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
-    if (at == std::string::npos) return text.substr(text.find_first_not_of('\0'));
-    if (i == lines) break;
-    begin = at;
+  for (int i = 0; i < lines && begin != 0; ++i) {
+    const auto end = begin < 2 ? std::string::npos : text.rfind('\n', begin - 2);
+    begin = end == std::string::npos ? 0 : end + 1;
   }
-  return text.substr(begin + 1);
+  return text.substr(std::min(text.find_first_not_of('\0', begin), text.size()));
+}
+
+// Where to continue in a log that was read up to `offset`. If it is shorter, the supervisor has
+// removed whole blocks of its beginning. As few as possible are assumed, which is right if less
+// than a block was not read yet; otherwise lines are left out, but none is repeated.
+std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
+  struct stat status{};
+  if (::fstat(file.get(), &status) != 0 || status.st_size >= offset) return offset;
+  const auto blocks = (offset - status.st_size + kLogBlockBytes - 1) / kLogBlockBytes;
+  return std::max<std::int64_t>(0, offset - blocks * kLogBlockBytes);
 }
 
 // Prints what is appended to the file, until a signal ends the program.
@@ -113,6 +125,7 @@ std::string lastLines(const std::string& text, int lines) {
   std::array<char, 65536> bytes{};
   for (;;) {
     for (;;) {
+      offset = continueAt(file, offset);
       const auto length = ::pread(file.get(), bytes.data(), bytes.size(), offset);
       if (length <= 0) break;
       offset += length;
@@ -155,6 +168,7 @@ void addLogs(CLI::App& app, Run& run) {
   command.add_option("process", arguments->process, "Name of the process")->required();
   command.add_flag("-f,--follow", arguments->follow, "Also show what it prints from now on");
   command.add_option("-n,--lines", arguments->lines, "Earlier lines to show")
+      ->check(wholeNumber(0, std::numeric_limits<int>::max()))
       ->capture_default_str();
   addCrateOption(command, arguments->crate);
   command.callback([arguments, &run] { run = [arguments] { return showLog(*arguments); }; });

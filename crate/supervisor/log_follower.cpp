@@ -124,12 +124,11 @@ std::string LogFollower::takeWhole(Log& log) {
 // Removes the first half of a log that is too long. The file system removes it as a whole, so no
 // line that is written meanwhile is lost; where it cannot (tmpfs), the log begins with a hole.
 void LogFollower::limit(Log& log) const {
-  constexpr std::int64_t kBlockBytes = 65536;
   struct stat status{};
   if (::fstat(log.file.get(), &status) != 0) return;
   const auto bytes = std::min<std::int64_t>(status.st_size, status.st_blocks * 512);
   if (bytes <= static_cast<std::int64_t>(maxBytes_)) return;
-  const auto removed = (status.st_size - bytes / 2) / kBlockBytes * kBlockBytes;
+  const auto removed = (status.st_size - bytes / 2) / kLogBlockBytes * kLogBlockBytes;
   if (removed == 0) return;
   if (::fallocate(log.file.get(), FALLOC_FL_COLLAPSE_RANGE, 0, removed) == 0)
     log.offset = std::max<std::int64_t>(log.offset - removed, 0);

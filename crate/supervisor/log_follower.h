@@ -18,6 +18,9 @@
 
 namespace mpf::crate {
 
+// A log is shortened by a multiple of this.
+inline constexpr std::int64_t kLogBlockBytes = 65536;
+
 // Counts repetitions of a line.
 class LineFolder {
  public:
