@@ -60,7 +60,8 @@ void LogFollower::add(const std::string& name, const std::string& path) {
   if (logs_.contains(name)) return;
   Log log;
   log.path = path;
-  log.file = FileDescriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+  log.file = FileDescriptor(
+      checkCall(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "open", path));
   log.offset = ::lseek(log.file.get(), 0, SEEK_END);
   checkCall(::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
   logs_.emplace(name, std::move(log));

@@ -45,6 +45,7 @@ class LogFollower {
   LogFollower(bool hasColour, std::uint64_t maxBytes);
 
   // Follows a log from its present end; it need not exist.
+  //   throws  std::system_error; then it is not followed
   void add(const std::string& name, const std::string& path);
   // Readable when a log has grown.
   [[nodiscard]] int descriptor() const noexcept { return events_.get(); }

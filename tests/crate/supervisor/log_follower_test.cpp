@@ -8,7 +8,9 @@
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <system_error>
 
+#include "tests/support/no_descriptors.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mpf::crate::test {
@@ -47,6 +49,20 @@ TEST_F(LogFollowerTest, ReturnsWholeLinesFromItsBeginning) {
   append(path_, "o\n\x1b[2J\n");
   EXPECT_EQ(follower.takeLines(), "dac | two\ndac | \\x1b[2J\n");
   EXPECT_EQ(follower.takeLines(), "");
+}
+
+TEST_F(LogFollowerTest, ALogThatCouldNotBeOpenedCanBeAddedLater) {
+  append(path_, "before\n");
+  LogFollower follower(false, 1u << 20);
+  {
+    const mpf::test::NoDescriptors none;
+    EXPECT_THROW(follower.add("dac", path_), std::system_error);
+  }
+  follower.add("dac", path_);
+
+  append(path_, "one\n");
+
+  EXPECT_EQ(follower.takeLines(), "dac | one\n");
 }
 
 TEST_F(LogFollowerTest, ReturnsALongLogInParts) {
