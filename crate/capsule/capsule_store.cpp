@@ -8,9 +8,11 @@
 #include <cerrno>
 #include <cstdio>
 #include <fmt/format.h>
+#include <string_view>
 
 #include <mpf/clock.h>
 
+#include "base/number.h"
 #include "base/output_file.h"
 #include "base/system_call.h"
 
@@ -19,12 +21,26 @@ namespace {
 
 constexpr const char* kEnding = ".capsule.json";
 
-// A name that sorts by time: 20 digits of nanoseconds.
-std::string freshName(const nlohmann::ordered_json& capsule) {
+// The number with which a name begins; 0: none.
+std::uint64_t numberOf(const std::filesystem::path& path) {
+  const auto name = path.filename().string();
+  std::string_view text = name;
+  return tryTakeNumber<std::uint64_t>(text).value_or(0);
+}
+
+// The time in nanoseconds; if the clock has been set back, a number above those of `paths`.
+std::uint64_t freshNumber(const std::vector<std::string>& paths) {
+  auto number = static_cast<std::uint64_t>(Clock::wallNs());
+  for (const auto& path : paths) number = std::max(number, numberOf(path) + 1);
+  return number;
+}
+
+// A name that sorts by the 20 digits of its number.
+std::string nameOf(const nlohmann::ordered_json& capsule, std::uint64_t number) {
   std::string process = capsule.value("process", "");
   std::ranges::replace_if(process, [](char c) { return c == '/' || c == '\0'; }, '_');
-  return fmt::format("{:020}-{}-{}{}", Clock::wallNs(), process.substr(0, 64),
-                     capsule.value("pid", 0), kEnding);
+  return fmt::format("{:020}-{}-{}{}", number, process.substr(0, 64), capsule.value("pid", 0),
+                     kEnding);
 }
 
 // Writes a file that gets its name when it is complete. After a failure its part is removed: on a
@@ -47,9 +63,9 @@ void writeWhole(const std::string& path, const std::string& text) {
 std::string CapsuleStore::add(const nlohmann::ordered_json& capsule) const {
   if (::mkdir(folder_.c_str(), 0700) != 0 && errno != EEXIST)
     throwSystemError(errno, "create", folder_.string());
-  const auto path = (folder_ / freshName(capsule)).string();
+  const auto path = (folder_ / nameOf(capsule, freshNumber(list()))).string();
   writeWhole(path, capsule.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  prune();
+  prune(path);
   return path;
 }
 
@@ -63,8 +79,10 @@ std::vector<std::string> CapsuleStore::list() const {
   return paths;
 }
 
-void CapsuleStore::prune() const {
-  const auto paths = list();
+void CapsuleStore::prune(const std::string& newest) const {
+  auto paths = list();
+  // A file with a name of another form may sort behind it.
+  std::ranges::stable_partition(paths, [&](const auto& path) { return path != newest; });
   std::uint64_t bytes = 0;
   std::size_t kept = 0;
   for (auto path = paths.rbegin(); path != paths.rend(); ++path) {

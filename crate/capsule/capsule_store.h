@@ -23,11 +23,11 @@ class CapsuleStore {
   // kept. Returns its path. Creates the folder.
   //   throws  std::system_error
   std::string add(const nlohmann::ordered_json& capsule) const;  // NOLINT(modernize-use-nodiscard)
-  // The paths of all capsules, the oldest first; empty when there is no folder.
+  // The paths of all capsules, in the order of add(); empty when there is no folder.
   [[nodiscard]] std::vector<std::string> list() const;
 
  private:
-  void prune() const;
+  void prune(const std::string& newest) const;
 
   std::filesystem::path folder_;
   std::size_t maxFiles_;

@@ -22,10 +22,9 @@ namespace mpf::crate {
 class CapsuleWriter {
  public:
   CapsuleWriter(const CrateFolder& folder, const Crate& crate)
-      : folder_(folder),
-        crate_(crate.name),
-        store_(folder.file("capsules"), static_cast<std::size_t>(crate.maxCapsules),
-               crate.maxCapsuleBytes) {}
+      : folder_(folder), crate_(crate.name), store_(storeOf(crate)) {}
+  // Takes the limits of a crate that was read again.
+  void setLimits(const Crate& crate) { store_ = storeOf(crate); }
 
   // Adds its descriptors to those for poll(); when one is readable, look() is due.
   void addTo(std::vector<pollfd>& polled) const;
@@ -40,6 +39,10 @@ class CapsuleWriter {
   std::string collect(const Service& service, const ProcessEnd& end);
 
  private:
+  [[nodiscard]] CapsuleStore storeOf(const Crate& crate) const {
+    return CapsuleStore(folder_.file("capsules"), static_cast<std::size_t>(crate.maxCapsules),
+                        crate.maxCapsuleBytes);
+  }
   std::string write(const Service& service, const ProcessEnd& end);
 
   CrateFolder folder_;

@@ -44,6 +44,7 @@ class LogFollower {
   //   throws     std::system_error
   LogFollower(bool hasColour, std::uint64_t maxBytes);
 
+  void setMaxBytes(std::uint64_t maxBytes) noexcept { maxBytes_ = maxBytes; }
   // Follows a log from its present end; it need not exist.
   //   throws  std::system_error; then it is not followed
   void add(const std::string& name, const std::string& path);

@@ -33,6 +33,8 @@ void Supervisor::reload() try {
   auto fresh = load_();
   apply(planProcesses(fresh, folder_.path().string()));
   crate_ = std::move(fresh);
+  logs_.setMaxBytes(crate_.maxLogBytes);
+  capsuleWriter_.setLimits(crate_);
   printError("mpf run: reloaded {}\n", crate_.file);
   ServiceManager::notifyReady();
 } catch (...) {

@@ -41,6 +41,27 @@ TEST(CapsuleStore, RemovesTheOldestAboveTheSizeButKeepsTheNewest) {
   EXPECT_EQ(store.list(), std::vector{second});
 }
 
+TEST(CapsuleStore, TheNewestSortsLastAfterTheClockWasSetBack) {
+  const mpf::test::TemporaryFolder files;
+  const CapsuleStore store(files.path(), 2);
+  static_cast<void>(files.write("09000000000000000000-a-1.capsule.json", "{}"));
+  const auto future = files.write("09000000000000000001-a-1.capsule.json", "{}");
+
+  const auto newest = store.add(kCapsule);
+
+  EXPECT_EQ(store.list(), (std::vector{future, newest}));
+}
+
+TEST(CapsuleStore, KeepsTheNewestBesideFilesOfOtherNames) {
+  const mpf::test::TemporaryFolder files;
+  const CapsuleStore store(files.path(), 1);
+  static_cast<void>(files.write("copy.capsule.json", "{}"));
+
+  const auto newest = store.add(kCapsule);
+
+  EXPECT_EQ(store.list(), std::vector{newest});
+}
+
 TEST(CapsuleStore, AFailedWriteLeavesNoFile) {
   const mpf::test::TemporaryFolder files;
   const CapsuleStore store(files.path());

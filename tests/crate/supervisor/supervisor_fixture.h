@@ -23,6 +23,8 @@
 
 namespace mpf::crate::test {
 
+inline const std::string kServer = "[[server]]\nprogram = \"int32\"\n";
+
 class SupervisorTest : public testing::Test {
  protected:
   SupervisorTest() {

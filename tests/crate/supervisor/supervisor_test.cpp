@@ -25,8 +25,6 @@ using namespace std::chrono_literals;
 using mpf::test::runCommand;
 using testing::HasSubstr;
 
-const std::string kServer = "[[server]]\nprogram = \"int32\"\n";
-
 TEST_F(SupervisorTest, StartsProcessesUntilTheirServersAreBindable) {
   run(kServer +
       "[carriers]\nipac = \"model\"\n[[server]]\nprogram = \"dac128v\"\n"
@@ -125,19 +123,6 @@ TEST_F(SupervisorTest, AProcessWaitsForOneThatFails) {
   EXPECT_EQ(stateOf("a"), "waiting");
 }
 
-TEST_F(SupervisorTest, StopsAndStartsAProcess) {
-  run(kServer);
-  waitForState("int32", "ready");
-
-  ask({{"do", "stop"}, {"name", "int32"}});
-  waitForState("int32", "stopped");
-  EXPECT_FALSE(isReplying("Int32", 1s));
-
-  ask({{"do", "start"}, {"name", "int32"}});
-  waitForState("int32", "ready");
-  EXPECT_TRUE(isReplying("Int32"));
-}
-
 // The server is replaced while clients call it: no call fails, and none gets the wrong reply.
 TEST_F(SupervisorTest, ReplacesAServerUnderLoad) {
   run(kServer);
@@ -166,17 +151,6 @@ TEST_F(SupervisorTest, ReplacesAServerUnderLoad) {
   isOver = true;
   for (auto& client : clients) client.join();
   EXPECT_EQ(process("int32").at("restarts"), 20);
-}
-
-TEST_F(SupervisorTest, RefusesUnknownRequestsAndNames) {
-  run(kServer);
-
-  EXPECT_THAT([&] { ask({{"do", "stop"}, {"name", "int23"}}); },
-              testing::ThrowsMessage<std::runtime_error>(
-                  "the crate has no process \"int23\"; it has int32"));
-  EXPECT_THAT([&] { ask({{"do", "dance"}, {"name", "int32"}}); },
-              testing::ThrowsMessage<std::runtime_error>("unknown request \"dance\""));
-  EXPECT_THROW(ask({{"name", "int32"}}), std::runtime_error);
 }
 
 // "The supervisor itself may be killed at any moment: servers go on, and a new supervisor takes
@@ -236,19 +210,6 @@ TEST_F(SupervisorTest, AReplacedProcessIsRestartedAndStoppedAfterATakeOver) {
   EXPECT_EQ(WEXITSTATUS(stop()), 0);
 }
 
-TEST_F(SupervisorTest, AReloadThatFailsChangesNothing) {
-  run(kServer);
-  waitForState("int32", "ready");
-  const auto pid = pidOf("int32");
-  ASSERT_EQ(::symlink("/nonexistent/log", folder().log("two").c_str()), 0);
-  write(std::string(kServer) + "[[server]]\nname = \"two\"\nprogram = \"int32\"\n");
-
-  EXPECT_THROW(ask({{"do", "reload"}}), std::runtime_error);
-
-  EXPECT_EQ(stateOf("int32"), "ready");
-  EXPECT_EQ(pidOf("int32"), pid);
-}
-
 TEST_F(SupervisorTest, ContinuesWhileItsStateCannotBeRecorded) {
   run(kServer);
   waitForState("int32", "ready");
@@ -280,40 +241,6 @@ TEST_F(SupervisorTest, IsKilledAtRandomMomentsWithoutOrphansOrDoubles) {
   EXPECT_TRUE(isReplying("Two"));
   EXPECT_EQ(WEXITSTATUS(stop()), 0);
   EXPECT_EQ(backplane_.segmentNames().size(), 0U) << "each process was supervised, and has ended";
-}
-
-TEST_F(SupervisorTest, ReloadsOnlyWhatHasChanged) {
-  run(kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
-  waitForState("int32", "ready");
-  waitForState("two", "ready");
-  const auto one = pidOf("int32");
-  const auto two = pidOf("two");
-
-  write(kServer + kServer + "name = \"two\"\nserver = \"Two\"\nqueue-size = 7\n" + kServer +
-        "name = \"three\"\nserver = \"Three\"\n");
-  ask({{"do", "reload"}});
-  waitForNew("two", two);
-  waitForState("three", "ready");
-  EXPECT_EQ(pidOf("int32"), one);
-
-  write(kServer);
-  ask({{"do", "reload"}});
-  waitForState("two", "absent");
-  waitForState("three", "absent");
-  EXPECT_EQ(pidOf("int32"), one);
-}
-
-TEST_F(SupervisorTest, AnInvalidFileChangesNothing) {
-  run(kServer);
-  waitForState("int32", "ready");
-  const auto one = pidOf("int32");
-  write("[[server]]\nprogram = \"none\"\n");
-
-  EXPECT_THAT([&] { ask({{"do", "reload"}}); },
-              testing::ThrowsMessage<std::runtime_error>(HasSubstr("unknown program \"none\"")));
-
-  EXPECT_EQ(pidOf("int32"), one);
-  EXPECT_EQ(stateOf("int32"), "ready");
 }
 
 TEST_F(SupervisorTest, KillsAProcessThatDoesNotEnd) {
