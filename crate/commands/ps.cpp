@@ -12,11 +12,14 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "base/command_line.h"
 #include "base/duration_text.h"
+#include "base/print_error.h"
 #include "base/printable.h"
 #include "base/process_stat.h"
+#include "base/run_main.h"
 #include "base/system_call.h"
 #include "base/whole_file.h"
 #include "crate/commands/commands.h"
@@ -67,26 +70,38 @@ void printCrate(const json& crate) {
   fmt::print("{}", table.fitted("  "));
 }
 
+// Returns the report of a crate. A supervisor that does not reply, because it is stopped, for
+// example, must not hide the other crates: then prints why, and returns nothing.
+std::optional<json> tryReport(const CrateFolder& folder) try {
+  auto crate = askSupervisor(folder, {{"do", "ps"}});
+  for (auto& process : crate.at("processes")) addUse(process);
+  return crate;
+} catch (const std::exception& error) {
+  printError("mpf ps: crate {}: {}\n", folder.name(), error.what());
+  return std::nullopt;
+}
+
+std::vector<CrateFolder> chosenFolders(const std::string& name) {
+  if (!name.empty()) return {CrateFolder::of(name)};
+  auto folders = CrateFolder::all();
+  std::erase_if(folders, [](const auto& folder) { return !folder.isLocked(); });
+  return folders;
+}
+
 int listProcesses(const std::string& name, bool isJson) {
+  const auto folders = chosenFolders(name);
   auto all = json::array();
-  std::vector<CrateFolder> folders;
-  if (name.empty()) folders = CrateFolder::all();
-  else folders.push_back(CrateFolder::of(name));
-  for (const auto& folder : folders) {
-    if (name.empty() && !folder.isLocked()) continue;
-    auto crate = askSupervisor(folder, {{"do", "ps"}});
-    for (auto& process : crate.at("processes")) addUse(process);
-    all.push_back(std::move(crate));
-  }
+  for (const auto& folder : folders)
+    if (auto crate = tryReport(folder)) all.push_back(std::move(*crate));
   if (isJson) {
     fmt::print("{}\n", jsonText(all));
-    return 0;
-  }
-  if (all.empty())
+  } else if (folders.empty()) {
     fmt::print("no crate is running (in {}); start one with `mpf run FILE`\n",
                CrateFolder::parent().string());
-  for (const auto& crate : all) printCrate(crate);
-  return 0;
+  } else {
+    for (const auto& crate : all) printCrate(crate);
+  }
+  return all.size() == folders.size() ? 0 : kExitFailed;
 }
 
 // ---- logs

@@ -40,14 +40,15 @@ FileDescriptor makeSocket() {
       checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket"));
 }
 
-std::string readLine(int socket, const Deadline& deadline) {
+std::string readLine(int socket, const Deadline& deadline, const std::string& crate) {
   std::string text;
   std::array<char, 4096> bytes{};
   for (;;) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
     pollfd poll{socket, POLLIN, 0};
     if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(left.count())); }) <= 0)
-      throw std::runtime_error("the supervisor does not reply; try again, or see its log");
+      throw std::runtime_error(fmt::format(
+          "the supervisor of the crate \"{}\" does not reply; try again, or see its log", crate));
     const auto length =
         retryInterrupted([&] { return ::read(socket, bytes.data(), bytes.size()); });
     if (length <= 0) return text;
@@ -78,7 +79,8 @@ nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& re
   // EPIPE: the supervisor has refused us already; its reply says why.
   if (::send(socket.get(), text.data(), text.size(), MSG_NOSIGNAL) < 0 && errno != EPIPE)
     throwSystemError(errno, "send", folder.file("control"));
-  auto reply = nlohmann::json::parse(readLine(socket.get(), Deadline::after(patience)));
+  auto reply =
+      nlohmann::json::parse(readLine(socket.get(), Deadline::after(patience), folder.name()));
   if (reply.contains("error")) throw std::runtime_error(reply.at("error").get<std::string>());
   return reply;
 } catch (const std::system_error& error) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf logs: which lines are shown, also of a log that the supervisor shortens.
+// mpf ps: a crate that does not reply. mpf logs: which lines are shown, also of a log that is
+// shortened.
 #include <sys/wait.h>
 
 #include <filesystem>
@@ -13,6 +14,24 @@ namespace {
 
 using mpf::test::runCommand;
 using testing::HasSubstr;
+
+using PsTest = SupervisorTest;
+
+TEST_F(PsTest, ShowsTheOtherCratesWhenOneDoesNotReply) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto silent = CrateFolder::of("a-silent-one");
+  silent.create();
+  const auto lock = silent.lock();  // as of a supervisor; it has no socket
+
+  const auto result = runCommand(MPF " ps 2>&1");
+  EXPECT_EQ(WEXITSTATUS(result.status), 1);
+  EXPECT_THAT(result.output, HasSubstr("crate a-silent-one: "));
+  EXPECT_THAT(result.output, testing::ContainsRegex("int32 +ready"));
+  const auto reports = runCommand(MPF " ps --json 2>/dev/null");
+  EXPECT_EQ(WEXITSTATUS(reports.status), 1);
+  EXPECT_EQ(nlohmann::json::parse(reports.output).at(0).at("crate"), "lab");
+}
 
 class LogsTest : public SupervisorTest {
  protected:

@@ -78,7 +78,8 @@ TEST_F(ControlProtocolTest, DoesNotWaitForeverForAReply) {
   const auto listening = listenForControl(folder_);
 
   EXPECT_THAT([&] { askSupervisor(folder_, {{"do", "ps"}}, 10ms); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("does not reply")));
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr("the supervisor of the crate \"lab\" does not reply")));
 }
 
 TEST_F(ControlProtocolTest, ReportsAnInvalidReply) {
