@@ -12,6 +12,7 @@
 
 #include "crate/commands/commands.h"
 #include "crate/supervisor/control_protocol.h"
+#include "tools/arguments.h"
 
 namespace mpf::crate {
 namespace {
@@ -33,8 +34,7 @@ json processOf(const json& report, const std::string& name) {
 // Waits until the process is in one of the states in which nothing more happens.
 int waitFor(const CrateFolder& folder, const ControlArguments& arguments, bool isStop,
             int pidBefore) {
-  const auto deadline = Deadline::after(
-      std::chrono::duration_cast<Nanoseconds>(std::chrono::duration<double>(arguments.waitS)));
+  const auto deadline = Deadline::after(tools::ofSeconds(arguments.waitS));
   for (;;) {
     const auto process = processOf(askSupervisor(folder, {{"do", "ps"}}), arguments.process);
     const auto state = process.value("state", "gone");
@@ -64,8 +64,7 @@ int controlProcess(const std::string& what, const ControlArguments& arguments) {
 int stopCrate(const ControlArguments& arguments) {
   const auto folder = chooseCrate(arguments.crate);
   askSupervisor(folder, {{"do", "shutdown"}});
-  const auto deadline = Deadline::after(
-      std::chrono::duration_cast<Nanoseconds>(std::chrono::duration<double>(arguments.waitS)));
+  const auto deadline = Deadline::after(tools::ofSeconds(arguments.waitS));
   while (folder.isLocked()) {
     if (deadline.hasPassed())
       throw std::runtime_error(
@@ -85,8 +84,8 @@ void addRequest(CLI::App& app, Run& run, const std::string& what, const char* he
   if (what == "stop") process->description("Name of the process; without it, the whole crate");
   else process->required();
   addCrateOption(command, arguments->crate);
-  command.add_option("--wait", arguments->waitS, "Longest time to wait for the result [s]")
-      ->capture_default_str();
+  tools::addSeconds(command, "--wait", arguments->waitS, "Longest time to wait for the result",
+                    true);
   command.callback([arguments, what, &run] {
     run = [arguments, what] {
       return arguments->process.empty() ? stopCrate(*arguments) : controlProcess(what, *arguments);

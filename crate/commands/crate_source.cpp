@@ -16,6 +16,12 @@ namespace {
 
 constexpr const char* kIocFile = "ioc.cmd";
 
+const std::string& checkedName(const std::string& name) {
+  const auto problem = problemOfName(name);
+  if (!problem.empty()) throw ConfigError("--" + problem);
+  return name;
+}
+
 }  // namespace
 
 void CrateSource::addOptions(CLI::App& command) {
@@ -76,7 +82,7 @@ Crate CrateSource::read() const {
                     "files: change the crate file instead",
                     file_));
   auto crate = readCrate(file_);
-  if (!name_.empty()) crate.name = name_;
+  if (!name_.empty()) crate.name = checkedName(name_);
   const auto kinds = carrierKinds();
   for (auto& carrier : crate.carriers) {
     auto replaced = kinds.find(carrier.name);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <memory>
+#include <stdexcept>
 
 #include "base/output_file.h"
 #include "base/print_error.h"
@@ -15,6 +16,7 @@
 #include "crate/commands/crate_source.h"
 #include "crate/config/crate_schema.h"
 #include "crate/config/process_plan.h"
+#include "crate/config/read_crate.h"
 #include "crate/supervisor/supervisor.h"
 
 namespace mpf::crate {
@@ -116,7 +118,11 @@ signal = "0=wire:dac.0"
 # needs = ["dac", "adc"]
 )";
 
+// `name` may have folders in front, which do not belong to the name of the crate.
 int writeNewCrate(const std::string& name) {
+  if (const auto problem = problemOfName(std::filesystem::path(name).filename().string());
+      !problem.empty())
+    throw std::invalid_argument(problem);
   const auto file = name + ".toml";
   if (std::filesystem::exists(file))
     throw std::runtime_error(fmt::format("{} exists; choose another name, or remove it", file));

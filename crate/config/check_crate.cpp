@@ -12,10 +12,6 @@
 namespace mpf::crate {
 namespace {
 
-// Names of crates and processes are names of folders and files.
-constexpr const char* kNameRule =
-    "use 1 to 100 characters without blanks and slashes, and no dot at the beginning";
-
 bool isFileName(const std::string& name) {
   const auto isAllowed = [](char one) {
     return static_cast<unsigned char>(one) > ' ' && one != '/' && one != 0x7f;
@@ -29,8 +25,8 @@ class CrateCheck {
   CrateCheck(const Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
 
   void run() {
-    if (!isFileName(crate_.name))
-      errors_.add(crate_.file, fmt::format("name \"{}\": {}", crate_.name, kNameRule));
+    if (const auto problem = problemOfName(crate_.name); !problem.empty())
+      errors_.add(crate_.file, problem);
     if (crate_.processes.empty())
       errors_.add(crate_.file,
                   "the crate starts nothing; write a [[server]], [[router]], [[ioc]] "
@@ -47,8 +43,8 @@ class CrateCheck {
 
  private:
   void checkName(const Process& process) {
-    if (!isFileName(process.name))
-      errors_.add(process.placeOf("name"), fmt::format("name \"{}\": {}", process.name, kNameRule));
+    if (const auto problem = problemOfName(process.name); !problem.empty())
+      errors_.add(process.placeOf("name"), problem);
     const auto [first, isNew] = names_.emplace(process.name, &process);
     if (!isNew)
       errors_.add(process.placeOf("name"),
@@ -178,6 +174,14 @@ class CrateCheck {
 };
 
 }  // namespace
+
+std::string problemOfName(const std::string& name) {
+  if (isFileName(name)) return {};
+  return fmt::format(
+      "name \"{}\": use 1 to 100 characters without blanks and slashes, and no dot at the "
+      "beginning",
+      name);
+}
 
 void checkCrate(const Crate& crate, ConfigErrors& errors) { CrateCheck(crate, errors).run(); }
 

@@ -18,6 +18,10 @@ namespace mpf::crate {
 // modules that two processes drive, unknown carriers, missing values.
 void checkCrate(const Crate& crate, ConfigErrors& errors);
 
+// Names of crates and processes are names of folders and files. Returns what is wrong with one;
+// empty: nothing.
+[[nodiscard]] std::string problemOfName(const std::string& name);
+
 // Parses "500ms", "2s" or "5min".
 //   throws  std::invalid_argument that shows the form
 [[nodiscard]] std::chrono::milliseconds parseDuration(const std::string& text);

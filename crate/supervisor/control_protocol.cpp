@@ -75,7 +75,7 @@ nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& re
   const SocketAddress address(folder);
   checkCall(::connect(socket.get(), address.get(), sizeof address.address), "connect",
             folder.file("control"));
-  const auto text = request.dump() + "\n";
+  const auto text = request.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   // EPIPE: the supervisor has refused us already; its reply says why.
   if (::send(socket.get(), text.data(), text.size(), MSG_NOSIGNAL) < 0 && errno != EPIPE)
     throwSystemError(errno, "send", folder.file("control"));

@@ -57,6 +57,16 @@ TEST_F(ControlProtocolTest, AsksAndReturnsTheReply) {
   EXPECT_EQ(request_, "{\"do\":\"ps\"}\n");
 }
 
+TEST_F(ControlProtocolTest, SendsANameThatIsNotUtf8) {
+  const auto listening = listenForControl(folder_);
+  auto server = serve(listening, "{}\n");
+
+  askSupervisor(folder_, {{"do", "stop"}, {"name", "\xff"}});
+
+  server.join();
+  EXPECT_THAT(request_, HasSubstr("\"name\":\"\xef\xbf\xbd\""));
+}
+
 TEST_F(ControlProtocolTest, ThrowsTheErrorOfTheSupervisor) {
   const auto listening = listenForControl(folder_);
   auto server = serve(listening, "{\"error\": \"no process\"}\n");
