@@ -24,6 +24,7 @@
 #include "router/alarm.h"
 #include "router/incoming/server_router.h"
 #include "router/outgoing/client_router.h"
+#include "router/outgoing/pending_binds.h"
 #include "router/transport/listener.h"
 #include "shm/watcher.h"
 

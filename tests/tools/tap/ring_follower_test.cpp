@@ -295,8 +295,10 @@ TEST_F(RingFollowerTest, ReportsEveryMissedMessageInAnyOrderOfOperations) {
         if (!random.oneIn(4)) break;
         RingCopy copy;
         const auto what = follower.tryNext(copy);
-        if (what == Next::nothing && std::exchange(isLater, false)) next = pushed + 1;
-        if (what == Next::nothing) EXPECT_EQ(next, pushed + 1);
+        if (what == Next::nothing) {
+          if (std::exchange(isLater, false)) next = pushed + 1;
+          EXPECT_EQ(next, pushed + 1);
+        }
         if (what == Next::overrun) {
           ++overruns;
           isLater = true;

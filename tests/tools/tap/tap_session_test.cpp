@@ -214,8 +214,8 @@ TEST_F(TapSessionTest, ReportsALinkThatCannotBeReadOnce) {
 }
 
 TEST_F(TapSessionTest, RefusesInvalidNames) {
-  EXPECT_THROW(TapSession(TapSelection{"a.b", "dac"}, sink_), std::invalid_argument);
-  EXPECT_THROW(TapSession(TapSelection{name(), ""}, sink_), std::invalid_argument);
+  EXPECT_THROW(TapSession(TapSelection{"a.b", "dac", 0, {}}, sink_), std::invalid_argument);
+  EXPECT_THROW(TapSession(TapSelection{name(), "", 0, {}}, sink_), std::invalid_argument);
 }
 
 TEST_F(TapSessionTest, EndsWhenTheSinkCannotWrite) {
