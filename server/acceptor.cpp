@@ -99,8 +99,9 @@ void Acceptor::open(std::unique_ptr<Link> link) {
     link->notifyPeer();
     return;
   }
-  connections_.open(connections_.add(*index, std::move(link)));
-  noteShortage(layout::Shortage::none, {});
+  auto& connection = connections_.add(*index, std::move(link));
+  noteShortage(layout::Shortage::none, {});  // before the client learns that it is accepted
+  connections_.open(connection);
 }
 
 // Each shortage counts as one alarm, for any number of clients that the server cannot accept.

@@ -15,7 +15,7 @@ import mpf
 
 
 class Line:
-    """The far end of a terminal line: answers VOLT? and TRACE? and is silent otherwise."""
+    """The far end of a terminal line: answers VOLT? and is silent otherwise."""
 
     def __init__(self) -> None:
         self.end, near = os.openpty()
@@ -35,8 +35,6 @@ class Line:
                 question, asked = asked.split(b"\r", 1)
                 if question == b"VOLT?":
                     os.write(self.end, b"+1.25\r")
-                elif question == b"TRACE?":
-                    os.write(self.end, bytes(1499) + b"\r")
 
     def close(self) -> None:
         os.close(self._near)

@@ -49,20 +49,17 @@ def test_an_answer_may_be_read_in_parts(meter: pyvisa.resources.SerialInstrument
 @pytest.mark.parametrize("chunk_size", [300, 20480])
 def test_an_answer_may_be_longer_than_the_buffer_of_the_server(
     resources: pyvisa.ResourceManager,
-    line: Line,
-    start: Callable[..., object],
+    meter: pyvisa.resources.SerialInstrument,
+    monkeypatch: pytest.MonkeyPatch,
     chunk_size: int,
 ) -> None:
-    start(PROGRAMS / "mpf-serial-server", "scope", line.device, "1000", "--log-level", "error")
-    scope = resources.open_resource("MPF::scope::INSTR")
-    assert isinstance(scope, pyvisa.resources.SerialInstrument)
-    scope.timeout = PATIENCE * 1000
-    scope.write_termination = "\r"
-    scope.chunk_size = chunk_size
+    """The server returns such an answer in parts, if it is reading when the bytes arrive."""
+    parts = [(b"x" * 1000, False), (b"y" * 499 + b"\r", True)]
+    session = resources.visalib._sessions[meter.session]
+    monkeypatch.setattr(session, "_receive", lambda: parts.pop(0))
+    meter.chunk_size = chunk_size
 
-    assert len(scope.query("TRACE?")) == 1500
-    assert scope.query("VOLT?") == "+1.25\r"
-    scope.close()
+    assert meter.read_raw() == b"x" * 1000 + b"y" * 499 + b"\r"
 
 
 def test_a_silent_instrument_is_a_timeout(meter: pyvisa.resources.SerialInstrument) -> None:

@@ -64,7 +64,8 @@ def check(project: Path, *command: str) -> tuple[int, str]:
 
 
 def test_mypy_has_no_complaint(project: Path) -> None:
-    assert check(project, "mypy", "--strict", "mpf", "pyvisa_mpf", "program.py")[0] == 0
+    status, text = check(project, "mypy", "--strict", "mpf", "pyvisa_mpf", "program.py")
+    assert status == 0, text
 
 
 def test_pyright_has_no_complaint(project: Path) -> None:

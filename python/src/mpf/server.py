@@ -263,21 +263,19 @@ class Server(_mpf.BaseServer):
     @contextlib.contextmanager
     def _cancelled_without_client(self, request: Message) -> Generator[None]:
         """Cancels the current task when the client has gone: it may wait for something else."""
-        loop, task = asyncio.get_running_loop(), asyncio.current_task()
+        task = asyncio.current_task()
         assert task is not None
 
-        def look() -> None:
-            nonlocal timer
-            if self.is_client_connected(request):
-                timer = loop.call_later(_LOOK, look)
-            else:
-                task.cancel()
+        async def watch() -> None:
+            while self.is_client_connected(request):
+                await asyncio.sleep(_LOOK)
+            task.cancel()
 
-        timer = loop.call_later(_LOOK, look)
+        watching = asyncio.ensure_future(watch())
         try:
             yield
         finally:
-            timer.cancel()
+            watching.cancel()
 
     def _handle(self, request: Message) -> object:
         handler = self._handlers.get(type(request)) or self._handlers.get(Message)

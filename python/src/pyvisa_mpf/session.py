@@ -89,7 +89,8 @@ class Session:
         taken, self._unread = self._unread[:count], self._unread[count:]
         if self._unread or not self._is_complete:
             return taken, StatusCode.success_max_count_read
-        if taken.endswith(self._termchar() or b"\0\0"):
+        termchar = self._termchar()
+        if termchar and taken.endswith(termchar):
             return taken, StatusCode.success_termination_character_read
         return taken, StatusCode.success
 
