@@ -34,10 +34,12 @@ std::optional<ProcessStat> ProcessStat::tryReadFile(const char* path) noexcept {
   return stat;
 }
 
-bool ProcessStat::hasEnded() const noexcept {
-  const auto state = from(3);
-  return state.starts_with('Z') || state.starts_with('X');
+char ProcessStat::state() const noexcept {
+  const auto rest = from(3);
+  return rest.empty() ? '?' : rest.front();
 }
+
+bool ProcessStat::hasEnded() const noexcept { return state() == 'Z' || state() == 'X'; }
 
 std::uint64_t ProcessStat::number(int field) const noexcept {
   auto rest = from(field);

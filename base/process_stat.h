@@ -20,12 +20,14 @@ class ProcessStat {
   static constexpr int kSystemTicks = 15;
   static constexpr int kStartTicks = 22;
 
-  // nullopt when there is no such process, /proc does not show it (errno ENOENT or ESRCH), or the
-  // file cannot be read (other values of errno).
+  // nullopt, and the reason in errno: there is no such process (ENOENT, ESRCH), /proc hides it
+  // (ENOENT, EPERM), or no descriptor is free, for example.
   static std::optional<ProcessStat> tryRead(pid_t pid) noexcept;
   // This process, also where /proc belongs to another pid namespace.
   static std::optional<ProcessStat> tryReadOwn() noexcept;
 
+  // Its letter in proc(5); '?' when the file does not have it.
+  [[nodiscard]] char state() const noexcept;
   // A zombie, or a process that is being removed.
   [[nodiscard]] bool hasEnded() const noexcept;
   // A field from 4 on; 0 when the file does not have it.

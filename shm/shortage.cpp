@@ -30,13 +30,14 @@ ShortageText textOf(Shortage shortage) noexcept {
   switch (shortage) {
     case Shortage::descriptors:
       return {"its process has no file descriptor left",
-              "restart that process with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the "
+              "restart the process of the server with a higher limit: ulimit -n 4096; "
+              "LimitNOFILE=4096 in the "
               "systemd unit"};
     case Shortage::openFiles:
       return {"the host has no open file left", "sysctl fs.file-max=N, with a larger N than now"};
     case Shortage::memory:
       return {"no memory is left",
-              "end programs that use much memory, or add memory; a limit of that process (ulimit "
+              "end programs that use much memory, or add memory; a limit of its process (ulimit "
               "-v, LimitAS=) may be too low, and with thousands of links vm.max_map_count"};
     case Shortage::threads:
       return {"its process can start no thread",

@@ -77,7 +77,7 @@ std::optional<json> tryReport(const CrateFolder& folder) try {
   for (auto& process : crate.at("processes")) addUse(process);
   return crate;
 } catch (const std::exception& error) {
-  printError("mpf ps: crate {}: {}\n", folder.name(), error.what());
+  printError("mpf ps: {}\n", error.what());
   return std::nullopt;
 }
 

@@ -141,7 +141,8 @@ void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number) {
 
 std::uint64_t startTicksOf(pid_t pid) {
   const auto stat = ProcessStat::tryRead(pid);
-  if (!stat && errno != ENOENT && errno != ESRCH)
+  // A process that /proc hides belongs to another user, so it is not ours.
+  if (!stat && (errno == EMFILE || errno == ENFILE || errno == ENOMEM))
     throw std::system_error(errno, std::generic_category(), fmt::format("read /proc/{}/stat", pid));
   return stat && !stat->hasEnded() ? stat->number(ProcessStat::kStartTicks) : 0;
 }

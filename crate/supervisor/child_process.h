@@ -50,8 +50,8 @@ class ChildProcess {
 void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number);
 
 // The start time of a process since boot, which identifies it together with its pid; 0: there is no
-// such process, or it is a zombie.
-//   throws  std::system_error if that cannot be found out, for example without a free descriptor
+// such process, /proc hides it, or it is a zombie.
+//   throws  std::system_error without a free descriptor or memory
 [[nodiscard]] std::uint64_t startTicksOf(pid_t pid);
 // The same time as CLOCK_MONOTONIC [ns], without the times in which the host was suspended.
 [[nodiscard]] std::int64_t startNsOf(std::uint64_t startTicks);

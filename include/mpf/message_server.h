@@ -270,7 +270,7 @@ class MessageServer {
   // --- operation
 
   // Sets a callback for a shortage: receive() calls it with the reason and a remedy when this
-  // process can accept no more clients because it has no file descriptors or memory left, and with
+  // process can accept no more clients because it lacks descriptors, memory or threads, and with
   // an empty text when it can again. Each shortage also counts as an alarm. Set it before the first
   // receive(). It must not throw.
   void onShortage(std::function<void(const std::string& why)> callback);

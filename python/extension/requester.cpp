@@ -139,8 +139,14 @@ void Requester::lookOnceMore(std::unique_lock<std::mutex>& lock, const Exchange&
   if (isRunning_) dispatcher_.interrupt();
   changed_.wait(lock, [&] { return !isRunning_ || exchange.hasEnded(); });
   // Messages come before requests that expire, and an interrupt may end one call.
-  for (int looks = 0; looks < kLastLooks && !exchange.hasEnded(); ++looks)
-    runDispatcher(lock, Deadline::atNs(0));
+  try {
+    for (int looks = 0; looks < kLastLooks && !exchange.hasEnded(); ++looks)
+      runDispatcher(lock, Deadline::atNs(0));
+  } catch (...) {
+    --lastLooks_;
+    changed_.notify_all();
+    throw;
+  }
   --lastLooks_;
   changed_.notify_all();
 }

@@ -50,6 +50,12 @@ class PyServer {
       if (!request) request = wait(*server, deadline);
       if (!request) break;
       if (hasClass(request)) return requestToPython(std::move(request));
+      request.reset();
+      // Such requests may come without end.
+      {
+        const nb::gil_scoped_release othersRun;
+      }
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
     }
     return nb::none();
   }

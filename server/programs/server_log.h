@@ -42,8 +42,7 @@ class ServerLog {
 
 class MessageServer;
 
-// Logs when `server` cannot accept clients because it has no file descriptors or memory left, and
-// when it can again.
+// Logs when `server` lacks descriptors, memory or threads to accept clients, and when it can again.
 void logShortages(MessageServer& server, const Log& log);
 
 }  // namespace mpf

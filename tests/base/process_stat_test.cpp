@@ -22,6 +22,8 @@ TEST(ProcessStat, HasTheNumbersOfAProcess) {
   EXPECT_GT(own->number(ProcessStat::kStartTicks), 0U);
   EXPECT_EQ(own->number(ProcessStat::kStartTicks), same->number(ProcessStat::kStartTicks));
   EXPECT_EQ(own->number(1000), 0U);
+  EXPECT_EQ(own->state(), 'R');
+  EXPECT_EQ(ProcessStat().state(), '?');
   EXPECT_FALSE(own->hasEnded());
 }
 

@@ -189,6 +189,17 @@ async def test_another_task_may_close_a_subscription(silent: Silent, hasReply: b
     assert received == ([5] if hasReply else [])
 
 
+async def test_a_subscription_that_waits_for_its_server_may_be_closed() -> None:
+    async with mpf.AsyncClient("absent") as client:
+        replies = client.subscribe(mpf.Int32())
+        receiving = asyncio.ensure_future(anext(replies, None))
+        while not client._waiting:
+            await asyncio.sleep(0)
+        replies.close()
+
+        assert await receiving is None
+
+
 async def test_a_thousand_subscriptions_of_one_client() -> None:
     sources = []
     # room for a thousand replies of two slots beyond the first ones

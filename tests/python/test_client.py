@@ -146,8 +146,7 @@ def test_a_request_expires_while_another_thread_waits(
     process = start(PROGRAMS / "mpf-int32-server")
     with mpf.Client("Int32") as client:
         client.int32(timeout=PATIENCE)
-        process.send_signal(signal.SIGSTOP)
-        os.waitpid(process.pid, os.WUNTRACED)
+        stop(process)
         other = client.send(mpf.Int32(), PATIENCE)
         waiting = threading.Thread(target=lambda: other.wait(check=False))
         waiting.start()

@@ -112,7 +112,7 @@ def test_a_recording_answers_as_the_server_did(tmp_path: Path) -> None:
 
 
 def test_a_ghost_that_has_died_is_an_error(doubler: mpf.Server, tmp_path: Path) -> None:
-    with mpf.record("doubler", tmp_path / "calls.mpf"), mpf.Client("doubler") as client:
+    with mpf.Client("doubler") as client, mpf.record("doubler", tmp_path / "calls.mpf"):
         client.int32(timeout=PATIENCE)
     ghost = mpf.replay(tmp_path / "calls.mpf", "ghost")
     ghost._process.kill()

@@ -87,6 +87,21 @@ def test_a_coroutine_that_closes_the_server_ends_first(server: mpf.Server) -> No
     server.close()
 
 
+def test_an_async_generator_that_closes_the_server_ends(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    async def count(request: mpf.Int32) -> AsyncIterator[int]:
+        while True:
+            yield 1
+            server.close()
+            await asyncio.sleep(0.001)
+
+    with mpf.Client("tested") as client:
+        running = threading.Thread(target=server.run)
+        running.start()
+        assert next(client.subscribe(mpf.Int32(), timeout=PATIENCE)).value == 1
+        running.join()
+
+
 @pytest.mark.parametrize("isAsync", [False, True])
 def test_a_generator_without_end_ends_with_its_client_and_with_the_server(
     server: mpf.Server, isAsync: bool

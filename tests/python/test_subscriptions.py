@@ -92,6 +92,18 @@ def test_another_thread_may_close_a_subscription(silent: Silent, hasReply: bool)
     assert received == ([5] if hasReply else [])
 
 
+def test_a_subscription_that_waits_for_its_server_may_be_closed() -> None:
+    with mpf.Client("absent") as client:
+        replies = client.subscribe(mpf.Int32())
+        received: list[list[mpf.Int32]] = []
+        receiving = threading.Thread(target=lambda: received.append(list(replies)))
+        receiving.start()
+        replies.close()
+        receiving.join()
+
+    assert received == [[]]
+
+
 def test_further_replies_of_a_request_that_was_sent_again_arrive() -> None:
     def serve() -> mpf.Server:
         server = mpf.Server("source")

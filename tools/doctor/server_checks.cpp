@@ -54,7 +54,7 @@ std::optional<Problem> tryProblemOf(const Host& host, const layout::SegmentHeade
   const auto shortage = control.shortage.load(std::memory_order_relaxed);
   const auto [lack, remedy] = textOf(shortage);
   const auto files = openFilesOf(host, header.ownerPid);
-  // A shortage is over when the next client is accepted, which may never come.
+  // A server clears its shortage only when it accepts the next client, which may never come.
   const bool isOver = shortage == layout::Shortage::descriptors && files.used != 0 &&
                       files.used + kFilesOfAClient < files.limit;
   if (*lack != '\0' && !isOver)

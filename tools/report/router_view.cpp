@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <fstream>
 
 #include <mpf/clock.h>
 #include <mpf/file_descriptor.h>
 
 #include "base/number.h"
 #include "base/printable.h"
+#include "base/process_stat.h"
 #include "shm/process.h"
 #include "shm/segment.h"
 
@@ -89,14 +89,9 @@ std::optional<RouterLineView> readRow(int file, std::size_t row, const layout::R
 
 }  // namespace
 
-// The letter follows the name of the program, which stands in brackets and may contain brackets.
 char processState(const Owner& owner) {
   if (owner.pidNamespace != Process::self().pidNamespace) return '?';
-  std::ifstream file("/proc/" + std::to_string(owner.pid) + "/stat");
-  std::string line;
-  std::getline(file, line);
-  const auto bracket = line.rfind(") ");
-  return bracket == std::string::npos || bracket + 2 >= line.size() ? '?' : line[bracket + 2];
+  return ProcessStat::tryRead(owner.pid).value_or(ProcessStat()).state();
 }
 
 const char* toString(layout::RouterLineState state) noexcept {

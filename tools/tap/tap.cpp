@@ -14,6 +14,7 @@
 #include "base/stop_signals.h"
 #include "tools/arguments.h"
 #include "tools/commands.h"
+#include "tools/inspect/dissect.h"
 #include "tools/tap/tap_session.h"
 #include "tools/text/wrap.h"
 
@@ -33,9 +34,11 @@ struct TapArguments : ServerArguments {
 constexpr std::size_t kFewestDigits = 6;  // of the number of a link, as for inspect
 constexpr int kShortPauses = 32;  // ratio of the longest pause to the shortest
 
-void checkLink(const std::string& digits) {
-  if (digits.empty() || (digits.size() >= kFewestDigits && tryNumber<std::uint64_t>(digits, 16)))
-    return;
+// As hex() shows it.
+std::string parseLink(const std::string& digits) {
+  if (digits.empty()) return digits;
+  const auto number = tryNumber<std::uint64_t>(digits, 16);
+  if (number && hex(*number).size() >= kFewestDigits) return hex(*number);
   throw std::invalid_argument(fmt::format(
       "tap: \"{}\" is not a link: use its hexadecimal number, as tap and inspect show it", digits));
 }
@@ -50,11 +53,11 @@ int tap(const TapArguments& arguments) {
   std::atomic<bool> stopped{false};
   const StopSignals stop(
       [](void* flag) noexcept { static_cast<std::atomic<bool>*>(flag)->store(true); }, &stopped);
-  checkLink(arguments.link);
+  const auto link = parseLink(arguments.link);
   const auto sink = sinkFor(arguments);
   TapSession session(
-      {Backplane::named(arguments.backplane).name(), arguments.server, arguments.location,
-       arguments.link, arguments.count != 0 ? arguments.count : UINT64_MAX},
+      {Backplane::named(arguments.backplane).name(), arguments.server, arguments.location, link,
+       arguments.count != 0 ? arguments.count : UINT64_MAX},
       *sink);
   if (session.isServerThere()) {
     printError("mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(),

@@ -158,6 +158,7 @@ void TapSession::close(Followed& followed) {
 }
 
 void TapSession::finish() {
+  runOnce();  // finds the links that are new
   for (auto& [name, followed] : followed_) drain(followed);
   followed_.clear();
 }

@@ -43,7 +43,7 @@ class TapSession {
   bool runOnce();
   // Returns when there may be a new link, after `limit`, or on a signal.
   void pause(Nanoseconds limit) const noexcept { names_.wait(limit); }
-  // Reads the remaining messages and reports missed ones.
+  // Reads the remaining messages, also those of links that are new, and reports missed ones.
   void finish();
 
   [[nodiscard]] bool isServerThere() const noexcept { return incarnation_ != 0; }

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
-from mpf.aio_requests import AsyncRequest, AsyncSubscription
+from mpf.aio_requests import CONNECTION, AsyncRequest, AsyncSubscription
 from mpf.client import LIMIT
 from mpf.errors import NotConnected
 
@@ -27,7 +27,6 @@ R = TypeVar("R", bound=Message)
 S = TypeVar("S")
 Self = TypeVar("Self")
 
-_CONNECTION = 0  # stands for the connection among the numbers of requests
 
 
 class AsyncClient(_mpf.BaseClient):
@@ -75,7 +74,7 @@ class AsyncClient(_mpf.BaseClient):
         self._attach()
         limit = self._until(timeout)
         while not self.connected:
-            if not await self._changed(_CONNECTION, limit):
+            if not await self._changed(CONNECTION, limit):
                 return False
         return True
 
@@ -247,7 +246,7 @@ class AsyncClient(_mpf.BaseClient):
 
     def _wake(self, number: int) -> None:
         waiting = self._waiting
-        if number == _CONNECTION:  # each request may have lost its connection
+        if number == CONNECTION:  # each request may have lost its connection
             futures = [future for group in waiting.values() for future in group]
             waiting.clear()
         else:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 M = TypeVar("M", bound=Message)
 Self = TypeVar("Self")
 
+CONNECTION = 0  # stands for the connection among the numbers of requests
+
 
 class AsyncRequest:
     """A request that was sent: AsyncClient.send_many() returns it."""
@@ -125,10 +127,14 @@ class AsyncSubscription(Generic[M]):
         """Ends the iteration, and drops later replies. The server is not told."""
         self._isClosed = True
         self._drop()
+        self._client._wake(CONNECTION)  # it may wait for the connection
 
     async def _first(self) -> M | None:
         client = self._client
         limit = client._until(self._timeout)
+        while not client.connected and await client._changed(CONNECTION, limit):
+            if self._isClosed:
+                return None
         request = await client._start(
             self._message, limit, reply=self._reply, further=self._limit
         )

@@ -8,13 +8,14 @@ Ctrl-C ends it.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
-from mpf.errors import Error, is_end_of_server
+from mpf.errors import Error, NotConnected, is_end_of_server
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -25,6 +26,7 @@ Self = TypeVar("Self")
 
 #: Further replies that wait for a program, for each subscription.
 LIMIT = 1000
+_LOOK = 0.1  # [s] between looks whether a subscription that waits for its server was closed
 
 
 class Client(_mpf.BaseClient):
@@ -284,9 +286,9 @@ class Subscription(Generic[M]):
         self._drop()
 
     def _first(self) -> M | None:
-        request = self._client._send(
-            self._message, self._timeout, reply=self._reply, further=self._limit
-        )
+        request = self._send()
+        if request is None:
+            return None
         self._request = request
         if self._isClosed:
             request.close()
@@ -297,6 +299,21 @@ class Subscription(Generic[M]):
             if self._isClosed or (self._renew and is_end_of_server(error)):
                 return None
             raise
+
+    def _send(self) -> Request | None:
+        """Waits for the connection; returns None after close()."""
+        end = time.monotonic() + self._timeout
+        while not self._isClosed:
+            left = max(end - time.monotonic(), 0.0)
+            try:
+                return self._client._send(
+                    self._message, left, reply=self._reply, further=self._limit, waits=False
+                )
+            except NotConnected:
+                if left == 0.0:
+                    raise
+                self._client.wait_connected(min(left, _LOOK))
+        return None
 
     def _further(self) -> M | None:
         request = self._request

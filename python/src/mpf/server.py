@@ -86,6 +86,8 @@ class Server(_mpf.BaseServer):
         self._handlers: dict[type[Message], Callable[[Any], object]] = {}
         self._tasks: set[asyncio.Task[Any]] = set()
         self._closing: set[asyncio.Task[Any]] = set()  # that have called close()
+        self._streams: dict[asyncio.Task[Any], Message] = {}  # generators and their requests
+        self._look: asyncio.TimerHandle | None = None  # at the clients of generators
         self._thread: threading.Thread | None = None
         self._state = threading.Condition()  # guards the next two
         self._runner: threading.Thread | None = None  # run() or serve() is in progress there
@@ -142,8 +144,7 @@ class Server(_mpf.BaseServer):
         In a handler, it ends them after the handler. In another thread, it waits for their end."""
         with self._state:
             if self._runner is not None or self._thread is not None:
-                with contextlib.suppress(Error):  # it is closed, or that of a parent process
-                    self.interrupt()
+                self._interrupt()
             if self._runner is threading.current_thread():
                 self._closesAtEnd = True
                 if (task := _current_task()) is not None:
@@ -151,11 +152,16 @@ class Server(_mpf.BaseServer):
                 return
             # After a fork, the thread that runs the server exists only in the parent.
             while self._runner is not None and self._runner.is_alive():
+                self._interrupt()  # it may have begun to run once more
                 self._state.wait(1)
         if self._thread is not None:
             self._thread.join()
             self._thread = None
         self._close()
+
+    def _interrupt(self) -> None:
+        with contextlib.suppress(Error):  # it is closed, or that of a parent process
+            self.interrupt()
 
     def publish(self, message: Message, requests: Iterable[M]) -> list[M]:
         """Sends `message` to the clients of all these requests, which read the same memory: for any
@@ -202,10 +208,14 @@ class Server(_mpf.BaseServer):
             while not self._take_interrupt():
                 while (request := self._receive(0)) is not None:
                     await self._start(request)
+                self._look_soon()  # a client may have gone
                 await readable.wait()
                 readable.clear()
         finally:
             loop.remove_reader(descriptor)
+            if self._look is not None:
+                self._look.cancel()
+                self._look = None
             for task in self._tasks - self._closing:
                 task.cancel()
             await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -265,17 +275,22 @@ class Server(_mpf.BaseServer):
         """Cancels the current task when the client has gone: it may wait for something else."""
         task = asyncio.current_task()
         assert task is not None
-
-        async def watch() -> None:
-            while self.is_client_connected(request):
-                await asyncio.sleep(_LOOK)
-            task.cancel()
-
-        watching = asyncio.ensure_future(watch())
+        self._streams[task] = request
+        self._look_soon()
         try:
             yield
         finally:
-            watching.cancel()
+            del self._streams[task]
+
+    def _look_soon(self) -> None:
+        if self._streams and self._look is None:
+            self._look = asyncio.get_running_loop().call_later(_LOOK, self._look_at_clients)
+
+    def _look_at_clients(self) -> None:
+        self._look = None
+        for task, request in self._streams.items():
+            if not self.is_client_connected(request):
+                task.cancel()
 
     def _handle(self, request: Message) -> object:
         handler = self._handlers.get(type(request)) or self._handlers.get(Message)
@@ -298,7 +313,7 @@ class Server(_mpf.BaseServer):
 
     def _try_reply(self, request: Message, value: object) -> bool:
         """Returns False while the client does not receive the earlier replies."""
-        if self._is_interrupted:
+        if self._is_interrupted or self._closesAtEnd:
             raise _NoMoreReplies
         try:
             wasSent = self._reply_with(request, value)

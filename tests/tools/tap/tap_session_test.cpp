@@ -139,6 +139,17 @@ TEST_F(TapSessionTest, FinishReadsTheRestWithoutClosing) {
   EXPECT_EQ(session_->seen(), 2U);
 }
 
+TEST_F(TapSessionTest, FinishReadsALinkThatIsNew) {
+  openServer();
+  begin();
+  connectClient();
+  exchange(5);
+
+  session_->finish();
+
+  EXPECT_THAT(sink_.take(), ElementsAre("opened dac", "request 5", "reply 6"));
+}
+
 TEST_F(TapSessionTest, FollowsOnlyTheChosenLink) {
   connect();
   const auto link = linkName().substr(linkName().rfind('.') + 1);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `mpf tap`: shows and records messages.
+#include <algorithm>
+#include <cctype>
 #include <regex>
 
 #include "tests/support/victim.h"
@@ -170,6 +172,9 @@ TEST_F(TapTest, FollowsOneChosenLink) {
   }
   // As inspect prints a number below 2^60.
   EXPECT_EQ(run({"tap", "echo", "0.1", "--link", "123456789abcdef"}).status, 0);
+  auto upper = link;
+  std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });
+  EXPECT_THAT(run({"tap", "echo", "0.1", "--link", upper}).err, HasSubstr("has 1 link now"));
 }
 
 TEST_F(TapTest, FailsAtOnceWhenTheFileCannotBeWritten) {
