@@ -116,6 +116,7 @@ class Judge {
     std::optional<segments::Probed> window;
     if (parsed.kind == NameKind::serverWindow) {
       auto finding = judgeWindow(name, layout::SegmentKind::serverWindow, window);
+      if (window) servers_.insert(window->header.incarnation);
       if (finding.verdict == Verdict::dead && window)
         deadWindows_.emplace(window->header.incarnation, DeadWindow{name, window->user});
       add(name, std::move(finding));
@@ -151,17 +152,20 @@ class Judge {
 
   void ofWindow(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::pendingBind)
-      add(name, judgeOwned(name, layout::SegmentKind::pendingBind));
+      add(name, judgeOwned(name, layout::SegmentKind::pendingBind, false));
     if (parsed.kind == NameKind::link)
-      add(name, links_[parsed.incarnation] = judgeOwned(name, layout::SegmentKind::link));
+      add(name, links_[parsed.incarnation] = judgeOwned(name, layout::SegmentKind::link,
+                                                        servers_.contains(parsed.serverWindow)));
   }
 
   // For a link or a pending bind: it is dead if the window of its client is dead.
-  Finding judgeOwned(const std::string& name, layout::SegmentKind kind) try {
+  //   isOurs  its server uses this version of the layout, so a header of another one is invalid
+  Finding judgeOwned(const std::string& name, layout::SegmentKind kind, bool isOurs) try {
     const auto header = segments::tryReadHeader(name, kind);
     if (!header) return {Verdict::dead, "its name no longer exists"};
     return ownerOf(clients_, NameKind::clientWindow, header->ownerWindow);
   } catch (const VersionError& error) {
+    if (isOurs) return {Verdict::dead, fmt::format("no program can use it: {}", error.what())};
     return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
   } catch (const SegmentError& error) {
     return {Verdict::dead, fmt::format("no program can use it: {}", error.what())};
@@ -200,6 +204,7 @@ class Judge {
 
   std::string backplane_;
   std::size_t most_;
+  std::set<std::uint64_t> servers_;  // incarnations of windows of this version of the layout
   std::set<std::uint64_t> listedLinks_;  // also those that were not chosen
   std::map<std::uint64_t, Finding> clients_;  // by the incarnation of the window
   std::multimap<std::uint64_t, DeadWindow> deadWindows_;  // likewise

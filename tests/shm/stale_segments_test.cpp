@@ -107,6 +107,21 @@ TEST_F(StaleSegmentsTest, FilesWithoutAnOwnerAreDead) {
   for (const auto& [file, judged] : judge()) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
 
+// A client may overwrite the header of its link. Of another version is only a link whose server is.
+TEST_F(StaleSegmentsTest, ALinkHasTheVersionOfItsServer) {
+  const OwnWindow server(name(), SegmentKind::serverWindow, serverName(), {},
+                         [](layout::SegmentHeader&) {});
+  const auto invalid = SegmentName::link(name(), server.header().incarnation, 2);
+  const auto other = SegmentName::link(name(), 1, 3);
+  for (const auto& link : {invalid, other})
+    leave(link, SegmentKind::link, 0x99, layout::kMajor + 1);
+
+  EXPECT_EQ(judgementOf(other).verdict, Verdict::unknown);
+  EXPECT_THAT(judgementOf(invalid).reason, HasSubstr("no program can use it: "));
+  EXPECT_TRUE(stale_segments::tryRemove(judgementOf(invalid)));
+  segments::remove(other);
+}
+
 // Another process removed the name of a window whose owner is alive.
 TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsItsOtherFiles) {
   const auto client = makeClient();
