@@ -26,7 +26,7 @@ TEST_F(PsTest, ShowsTheOtherCratesWhenOneDoesNotReply) {
 
   const auto result = runCommand(MPF " ps 2>&1");
   EXPECT_EQ(WEXITSTATUS(result.status), 1);
-  EXPECT_THAT(result.output, HasSubstr("crate a-silent-one: "));
+  EXPECT_THAT(result.output, HasSubstr("mpf ps: the crate \"a-silent-one\" "));
   EXPECT_THAT(result.output, testing::ContainsRegex("int32 +ready"));
   const auto reports = runCommand(MPF " ps --json 2>/dev/null");
   EXPECT_EQ(WEXITSTATUS(reports.status), 1);
