@@ -30,8 +30,7 @@ ShortageText textOf(Shortage shortage) noexcept {
   switch (shortage) {
     case Shortage::descriptors:
       return {"its process has no file descriptor left",
-              "restart the process of the server with a higher limit: ulimit -n 4096; "
-              "LimitNOFILE=4096 in the "
+              "restart its process with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the "
               "systemd unit"};
     case Shortage::openFiles:
       return {"the host has no open file left", "sysctl fs.file-max=N, with a larger N than now"};

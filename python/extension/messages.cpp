@@ -332,13 +332,11 @@ nb::object make(Message&& message, bool isRequest) {
   }
 }
 
-nb::object convert(Message&& message, bool isRequest) {
-  const auto type = message.getType();
-  if (!hasClass(message))
-    throw nb::type_error(("a message of type " + std::to_string(static_cast<int>(type)) +
-                          " arrived, which this version of mpf lacks")
-                             .c_str());
+// Returns an empty object, and leaves `message` as it is, if it has no class or is not sound.
+nb::object tryConvert(Message&& message, bool isRequest) {
   nb::object result;
+  const auto type = message.getType();
+  if (!message.isSound()) return result;
   forEachType([&]<class T>(std::type_identity<T> /*type*/) {
     if (type == T::kType) result = make<T>(std::move(message), isRequest);
   });
@@ -347,15 +345,15 @@ nb::object convert(Message&& message, bool isRequest) {
 
 }  // namespace
 
-bool hasClass(const Message& message) {
-  bool has = false;
-  forEachType(
-      [&]<class T>(std::type_identity<T> /*type*/) { has = has || message.getType() == T::kType; });
-  return has && message.isSound();
+nb::object toPython(Message&& message) {
+  const auto type = static_cast<int>(message.getType());
+  auto result = tryConvert(std::move(message), false);
+  if (result.is_valid()) return result;
+  PyErr_Format(PyExc_TypeError, "a message of type %d arrived, which this version of mpf lacks",
+               type);
+  throw nb::python_error();
 }
-
-nb::object toPython(Message&& message) { return convert(std::move(message), false); }
-nb::object requestToPython(Message&& request) { return convert(std::move(request), true); }
+nb::object tryRequestToPython(Message&& request) { return tryConvert(std::move(request), true); }
 
 nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length) {
   nb::object result;

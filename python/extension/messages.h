@@ -170,13 +170,12 @@ Message PyArray<T>::filled(const Allocator& allocator, std::span<const std::byte
   return message;
 }
 
-// Whether a received message has a class in Python and a body that fits it.
-[[nodiscard]] bool hasClass(const Message& message);
 // The object of Python for a received message, which it owns.
-//   throws  nb::python_error; TypeError without hasClass()
+//   throws  nb::python_error; TypeError of a type that Python does not have
 [[nodiscard]] nb::object toPython(Message&& message);
-// The same for a request, whose handle the object owns.
-[[nodiscard]] nb::object requestToPython(Message&& request);
+// The same for a request, whose handle the object owns. Empty, with `request` unchanged, if Python
+// does not have its type, or if its body does not fit the type.
+[[nodiscard]] nb::object tryRequestToPython(Message&& request);
 // An array message in the memory that is shared with the peer, for the program to fill in.
 //   type  mpf.Int32Array, mpf.Float64Array, mpf.Char8Array or mpf.User
 [[nodiscard]] nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length);

@@ -135,20 +135,20 @@ void Requester::waitForEnd(Exchange& exchange, Deadline deadline,
 
 // Delivers `expired` if the server has not received the request.
 void Requester::lookOnceMore(std::unique_lock<std::mutex>& lock, const Exchange& exchange) {
-  ++lastLooks_;
+  struct Turn {
+    explicit Turn(Requester& of) : self(of) { ++self.lastLooks_; }
+    ~Turn() {
+      --self.lastLooks_;
+      self.changed_.notify_all();
+    }
+    Requester& self;
+  };
+  const Turn turn(*this);
   if (isRunning_) dispatcher_.interrupt();
   changed_.wait(lock, [&] { return !isRunning_ || exchange.hasEnded(); });
   // Messages come before requests that expire, and an interrupt may end one call.
-  try {
-    for (int looks = 0; looks < kLastLooks && !exchange.hasEnded(); ++looks)
-      runDispatcher(lock, Deadline::atNs(0));
-  } catch (...) {
-    --lastLooks_;
-    changed_.notify_all();
-    throw;
-  }
-  --lastLooks_;
-  changed_.notify_all();
+  for (int looks = 0; looks < kLastLooks && !exchange.hasEnded(); ++looks)
+    runDispatcher(lock, Deadline::atNs(0));
 }
 
 Message Requester::waitForFurther(Exchange& exchange, Deadline deadline,

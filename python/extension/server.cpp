@@ -49,10 +49,8 @@ class PyServer {
       Message request = server->receive();
       if (!request) request = wait(*server, deadline);
       if (!request) break;
-      if (hasClass(request)) return requestToPython(std::move(request));
-      request.reset();
-      // Such requests may come without end.
-      {
+      if (auto object = tryRequestToPython(std::move(request)); object.is_valid()) return object;
+      {  // such requests may come without end
         const nb::gil_scoped_release othersRun;
       }
       if (PyErr_CheckSignals() != 0) throw nb::python_error();

@@ -91,6 +91,13 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
 
 @pytest.fixture
+def server() -> Iterator[mpf.Server]:
+    """A server that a test starts itself."""
+    with mpf.Server("tested") as server:
+        yield server
+
+
+@pytest.fixture
 def doubler() -> Iterator[mpf.Server]:
     """A server that replies with twice the value."""
     server = mpf.Server("doubler")

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from conftest import PATIENCE, PROGRAMS, Silent, again_if_late, needs_mpf
@@ -107,56 +107,54 @@ def test_a_request_that_the_server_refuses_is_refused(silent: Silent) -> None:
             request.wait()
 
 
-def stop(process: subprocess.Popen[str]) -> None:
-    """Stops the process; after the return it does not run."""
+@pytest.fixture
+def client() -> Iterator[mpf.Client]:
+    with mpf.Client("Int32") as client:
+        yield client
+
+
+@pytest.fixture
+def stopped(
+    start: Callable[..., subprocess.Popen[str]], client: mpf.Client
+) -> subprocess.Popen[str]:
+    """The server of the client, which has replied to it and is stopped now."""
+    process = start(PROGRAMS / "mpf-int32-server")
+    client.int32(timeout=PATIENCE)
     process.send_signal(signal.SIGSTOP)
     os.waitpid(process.pid, os.WUNTRACED)
+    return process
 
 
 def test_a_request_whose_server_dies_has_an_unknown_outcome(
-    start: Callable[..., subprocess.Popen[str]],
+    stopped: subprocess.Popen[str], client: mpf.Client
 ) -> None:
-    process = start(PROGRAMS / "mpf-int32-server")
-    with mpf.Client("Int32") as client:
-        client.int32(timeout=PATIENCE)
-        stop(process)
-        request = client.send(mpf.Int32(), timeout=PATIENCE)
-        process.kill()
+    request = client.send(mpf.Int32(), timeout=PATIENCE)
+    stopped.kill()
 
-        with pytest.raises((mpf.NeverTaken, mpf.OutcomeUnknown)):
-            request.wait()
+    with pytest.raises((mpf.NeverTaken, mpf.OutcomeUnknown)):
+        request.wait()
 
 
-def test_a_request_that_no_server_takes_expires(
-    start: Callable[..., subprocess.Popen[str]],
-) -> None:
-    process = start(PROGRAMS / "mpf-int32-server")
-    with mpf.Client("Int32") as client:
-        client.int32(timeout=PATIENCE)
-        stop(process)
-
-        with pytest.raises(mpf.Expired, match="nothing was done"):
-            client.int32(timeout=0.05)
+@pytest.mark.usefixtures("stopped")
+def test_a_request_that_no_server_takes_expires(client: mpf.Client) -> None:
+    with pytest.raises(mpf.Expired, match="nothing was done"):
+        client.int32(timeout=0.05)
 
 
 def test_a_request_expires_while_another_thread_waits(
-    start: Callable[..., subprocess.Popen[str]],
+    stopped: subprocess.Popen[str], client: mpf.Client
 ) -> None:
     """The other thread may handle what belongs to this one."""
-    process = start(PROGRAMS / "mpf-int32-server")
-    with mpf.Client("Int32") as client:
-        client.int32(timeout=PATIENCE)
-        stop(process)
-        other = client.send(mpf.Int32(), PATIENCE)
-        waiting = threading.Thread(target=lambda: other.wait(check=False))
-        waiting.start()
+    other = client.send(mpf.Int32(), PATIENCE)
+    waiting = threading.Thread(target=lambda: other.wait(check=False))
+    waiting.start()
 
-        for _ in range(20):
-            with pytest.raises(mpf.Expired):
-                client.int32(timeout=0.02)
+    for _ in range(20):
+        with pytest.raises(mpf.Expired):
+            client.int32(timeout=0.02)
 
-        process.send_signal(signal.SIGCONT)
-        waiting.join()
+    stopped.send_signal(signal.SIGCONT)
+    waiting.join()
 
 
 def test_a_reply_may_be_asked_for_again(doubler: mpf.Server) -> None:

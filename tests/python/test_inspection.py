@@ -61,8 +61,7 @@ def test_a_tap_that_cannot_start_says_why() -> None:
 
 def test_a_tap_ends_when_it_is_closed(doubler: mpf.Server) -> None:
     with mpf.Client("doubler") as client, mpf.tap("doubler") as messages:
-        while not client.int32(timeout=PATIENCE):
-            pass
+        client.int32(timeout=PATIENCE)
         for _ in messages:
             messages.close()
 

@@ -7,19 +7,13 @@ import asyncio
 import subprocess
 import threading
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 
 import numpy as np
 import pytest
 from conftest import PATIENCE, PROGRAMS, needs_mpf
 
 import mpf
-
-
-@pytest.fixture
-def server() -> Iterator[mpf.Server]:
-    with mpf.Server("tested") as server:
-        yield server
 
 
 def call(message: mpf.Message) -> object:

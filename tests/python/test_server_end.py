@@ -19,12 +19,6 @@ import mpf
 LAYOUT = Path(__file__).parent.parent / "layout" / "v1_0"
 
 
-@pytest.fixture
-def server() -> Iterator[mpf.Server]:
-    with mpf.Server("tested") as server:
-        yield server
-
-
 def call(message: mpf.Int32) -> int:
     with mpf.Client("tested", timeout=PATIENCE) as client:
         return client.call(message, PATIENCE).value

@@ -92,12 +92,22 @@ def test_another_thread_may_close_a_subscription(silent: Silent, hasReply: bool)
     assert received == ([5] if hasReply else [])
 
 
-def test_a_subscription_that_waits_for_its_server_may_be_closed() -> None:
+def test_a_subscription_that_waits_for_its_server_may_be_closed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waits = threading.Event()
+
+    def wait(client: mpf.Client, timeout: float) -> bool:
+        waits.set()
+        return client._wait_connected(timeout)
+
+    monkeypatch.setattr(mpf.Client, "wait_connected", wait)
     with mpf.Client("absent") as client:
         replies = client.subscribe(mpf.Int32())
         received: list[list[mpf.Int32]] = []
         receiving = threading.Thread(target=lambda: received.append(list(replies)))
         receiving.start()
+        assert waits.wait(PATIENCE)
         replies.close()
         receiving.join()
 

@@ -32,5 +32,6 @@ struct DissectOptions {
 
 // An incarnation as the names of segments contain it.
 [[nodiscard]] std::string hex(std::uint64_t incarnation);
+inline constexpr std::size_t kFewestDigits = 6;  // of hex() that name a link or a window
 
 }  // namespace mpf::tools

@@ -66,10 +66,9 @@ class Selection {
   static bool isFile(const std::string& name, const std::string& file) {
     return name == file || name == segments::path(file);
   }
-  // An incarnation, or at least its first kLeast digits.
+  // An incarnation, or at least its first kFewestDigits digits.
   static bool isNumber(const std::string& name, std::uint64_t incarnation) {
-    constexpr std::size_t kLeast = 6;
-    return name.size() >= kLeast && hex(incarnation).starts_with(name);
+    return name.size() >= kFewestDigits && hex(incarnation).starts_with(name);
   }
   std::set<std::string> missing_;
   const std::vector<std::string>& names_;

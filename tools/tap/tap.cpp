@@ -31,7 +31,6 @@ struct TapArguments : ServerArguments {
   bool printAll = false;
 };
 
-constexpr std::size_t kFewestDigits = 6;  // of the number of a link, as for inspect
 constexpr int kShortPauses = 32;  // ratio of the longest pause to the shortest
 
 // As hex() shows it.
@@ -39,8 +38,10 @@ std::string parseLink(const std::string& digits) {
   if (digits.empty()) return digits;
   const auto number = tryNumber<std::uint64_t>(digits, 16);
   if (number && hex(*number).size() >= kFewestDigits) return hex(*number);
-  throw std::invalid_argument(fmt::format(
-      "tap: \"{}\" is not a link: use its hexadecimal number, as tap and inspect show it", digits));
+  throw std::invalid_argument(
+      fmt::format("tap: \"{}\" is not a link: use its hexadecimal number, or at least {} of its "
+                  "first digits, as tap and inspect show it",
+                  digits, kFewestDigits));
 }
 
 std::unique_ptr<TapSink> sinkFor(const TapArguments& arguments) {
@@ -60,8 +61,7 @@ int tap(const TapArguments& arguments) {
        arguments.count != 0 ? arguments.count : UINT64_MAX},
       *sink);
   if (session.isServerThere()) {
-    printError("mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(),
-               session.links() == 1 ? "" : "s");
+    printError("mpf tap: \"{}\" has {} now\n", arguments.server, counted(session.links(), "link"));
   } else {
     printError("mpf tap: server \"{}\" at location {} is absent; waiting for it\n",
                arguments.server, arguments.location);

@@ -317,8 +317,10 @@ class Subscription(Generic[M]):
 
     def _further(self) -> M | None:
         request = self._request
-        message = request.next(self._timeout) if request is not None else None
-        if message is None and request is not None and request.connected:
+        if request is None:  # another thread has closed the subscription
+            return None
+        message = request.next(self._timeout)
+        if message is None and request.connected:
             raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
         if message is None:
             self._drop()
