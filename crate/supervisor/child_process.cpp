@@ -20,6 +20,7 @@
 
 #include "base/process_stat.h"
 #include "base/system_call.h"
+#include "shm/shortage.h"
 
 namespace mpf::crate {
 namespace {
@@ -141,10 +142,11 @@ void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number) {
 
 std::uint64_t startTicksOf(pid_t pid) {
   const auto stat = ProcessStat::tryRead(pid);
-  // A process that /proc hides belongs to another user, so it is not ours.
-  if (!stat && (errno == EMFILE || errno == ENFILE || errno == ENOMEM))
-    throw std::system_error(errno, std::generic_category(), fmt::format("read /proc/{}/stat", pid));
-  return stat && !stat->hasEnded() ? stat->number(ProcessStat::kStartTicks) : 0;
+  if (stat) return stat->hasEnded() ? 0 : stat->number(ProcessStat::kStartTicks);
+  const std::system_error error(errno, std::generic_category(),
+                                fmt::format("read /proc/{}/stat", pid));
+  if (shortageOf(error) != layout::Shortage::none) throw error;
+  return 0;  // a process that /proc hides belongs to another user, so it is not ours
 }
 
 std::int64_t startNsOf(std::uint64_t startTicks) {

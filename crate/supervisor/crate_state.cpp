@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "crate/supervisor/crate_state.h"
 
-#include <cerrno>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -9,6 +8,7 @@
 #include "base/output_file.h"
 #include "base/system_call.h"
 #include "base/whole_file.h"
+#include "shm/shortage.h"
 
 namespace mpf::crate {
 namespace {
@@ -29,7 +29,7 @@ CrateState CrateState::read(const std::string& path) try {
   return state;
 } catch (const std::system_error& error) {
   // The processes may run: without them, a second one of each would be started.
-  if (error.code().value() == EMFILE || error.code().value() == ENFILE) throw;
+  if (shortageOf(error) != layout::Shortage::none) throw;
   return {};
 } catch (const nlohmann::json::exception&) {
   return {};

@@ -30,7 +30,7 @@ struct CrateState {
   std::string file;  // the crate file
   std::vector<RecordedProcess> processes;
 
-  //   throws  std::system_error without a free descriptor
+  //   throws  std::system_error without a free descriptor or memory
   [[nodiscard]] static CrateState read(const std::string& path);
   //   throws  std::system_error
   void write(const std::string& path) const;

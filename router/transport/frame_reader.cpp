@@ -75,8 +75,8 @@ std::optional<std::uint64_t> FrameReader::frameBytes() const {
   if (pending() < table) return std::nullopt;
   std::uint64_t bytes = table;
   for (std::size_t segment = 0; segment < segments; ++segment) {
-    const auto at = begin_ + 4 * (segment + 1);
-    bytes += std::uint64_t{loadLittle<std::uint32_t>(buffer_.asBytes(), at)} * kWord;
+    const auto place = begin_ + 4 * (segment + 1);
+    bytes += std::uint64_t{loadLittle<std::uint32_t>(buffer_.asBytes(), place)} * kWord;
   }
   if (bytes > maxFrameBytes_) {
     throw ProtocolError(
