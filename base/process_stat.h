@@ -13,6 +13,11 @@
 
 namespace mpf {
 
+// Whether a state of proc(5) is that of a process that a signal or a debugger has stopped.
+[[nodiscard]] constexpr bool isStopped(char processState) noexcept {
+  return processState == 'T' || processState == 't';
+}
+
 class ProcessStat {
  public:
   // Fields of proc(5).

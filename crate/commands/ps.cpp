@@ -70,8 +70,8 @@ void printCrate(const json& crate) {
   fmt::print("{}", table.fitted("  "));
 }
 
-// Returns the report of a crate. A supervisor that does not reply, because it is stopped, for
-// example, must not hide the other crates: then prints why, and returns nothing.
+// Returns the report of a crate. A supervisor that does not reply must not hide the other crates:
+// then prints why, and returns nothing.
 std::optional<json> tryReport(const CrateFolder& folder) try {
   auto crate = askSupervisor(folder, {{"do", "ps"}});
   for (auto& process : crate.at("processes")) addUse(process);

@@ -7,6 +7,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -15,10 +16,13 @@
 
 #include <mpf/clock.h>
 
+#include "base/process_stat.h"
 #include "base/system_call.h"
 
 namespace mpf::crate {
 namespace {
+
+constexpr std::chrono::milliseconds kLookAtSupervisorEvery{500};
 
 // The address of the socket. The path goes through a descriptor of the folder, because the path of
 // a socket has at most 107 bytes, and that of the folder may be longer.
@@ -40,15 +44,43 @@ FileDescriptor makeSocket() {
       checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket"));
 }
 
+// The process at the other end; 0 if it is in a pid namespace that this one does not see.
+pid_t peerOf(int socket) {
+  ucred peer{};
+  socklen_t length = sizeof peer;
+  checkCall(::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &length), "getsockopt");
+  return peer.pid;
+}
+
+// A stopped supervisor replies only after somebody has continued it.
+void checkNotStopped(int socket, const std::string& crate) {
+  const auto pid = peerOf(socket);
+  const auto stat = ProcessStat::tryRead(pid);
+  if (!stat || !isStopped(stat->state())) return;
+  throw std::runtime_error(fmt::format(
+      "the supervisor of the crate \"{}\", process {}, is stopped; `kill -CONT {}` continues it",
+      crate, pid, pid));
+}
+
+void waitForReply(int socket, const Deadline& deadline, const std::string& crate) {
+  for (;;) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
+    pollfd poll{socket, POLLIN, 0};
+    const auto wait = std::min(left, kLookAtSupervisorEvery);
+    if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(wait.count())); }) > 0)
+      return;
+    checkNotStopped(socket, crate);
+    if (deadline.hasPassed())
+      throw std::runtime_error(fmt::format(
+          "the supervisor of the crate \"{}\" does not reply; try again, or see its log", crate));
+  }
+}
+
 std::string readLine(int socket, const Deadline& deadline, const std::string& crate) {
   std::string text;
   std::array<char, 4096> bytes{};
   for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
-    pollfd poll{socket, POLLIN, 0};
-    if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(left.count())); }) <= 0)
-      throw std::runtime_error(fmt::format(
-          "the supervisor of the crate \"{}\" does not reply; try again, or see its log", crate));
+    waitForReply(socket, deadline, crate);
     const auto length =
         retryInterrupted([&] { return ::read(socket, bytes.data(), bytes.size()); });
     if (length <= 0) return text;

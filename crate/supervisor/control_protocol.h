@@ -28,8 +28,8 @@ inline constexpr std::size_t kMaxRequestBytes = 65536;
 [[nodiscard]] FileDescriptor listenForControl(const CrateFolder& folder);
 
 // Sends a request to the supervisor and returns its reply.
-//   throws  std::runtime_error when no supervisor runs, when it does not reply within `patience`,
-//           or with the error that it replied
+//   throws  std::runtime_error when no supervisor runs, when it is stopped, when it does not reply
+//           within `patience`, or with the error that it replied
 nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& request,
                              std::chrono::milliseconds patience = std::chrono::seconds(30));
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/process_stat.h"
 #include "shm/stale_segments.h"
 
 namespace mpf::crate {
@@ -17,8 +18,7 @@ namespace {
 // although some wait. A server that works on one request for a long time is busy, not stalled; a
 // stopped process does not work.
 bool takesNothing(const WindowView& was, const WindowView& is) {
-  const auto isStopped = is.processState == 'T' || is.processState == 't';
-  if (is.handling && !isStopped) return false;
+  if (is.handling && !isStopped(is.processState)) return false;
   const auto isWaiting = [](const WindowView& window) {
     return Totals::of(window).incoming.waiting() != 0 || !window.hints.knocks.empty();
   };

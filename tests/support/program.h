@@ -34,6 +34,11 @@ class Program {
   Program& operator=(const Program&) = delete;
 
   void signal(int number) const { ::kill(pid_, number); }
+  // Stops the process (SIGSTOP), and returns when it has stopped.
+  void stop() const {
+    signal(SIGSTOP);
+    checkCall(::waitpid(pid_, nullptr, WUNTRACED), "waitpid");
+  }
   // Waits until the process has ended. Returns the status of waitpid().
   int wait() {
     int status = 0;

@@ -9,6 +9,7 @@
 #include <mpf/message_types.h>
 
 #include "base/duration_text.h"
+#include "base/process_stat.h"
 
 namespace mpf::tools {
 namespace {
@@ -16,8 +17,6 @@ namespace {
 double perSecond(std::uint64_t messages, std::int64_t ns) noexcept {
   return ns > 0 ? static_cast<double>(messages) * 1e9 / static_cast<double>(ns) : 0;
 }
-
-bool isStopped(char processState) noexcept { return processState == 'T' || processState == 't'; }
 
 std::uint64_t grown(std::uint64_t was, std::uint64_t is) noexcept {
   return is > was ? is - was : 0;

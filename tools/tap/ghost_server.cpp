@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "tools/tap/pace.h"
+
 namespace mpf::tools {
 namespace {
 
@@ -41,7 +43,7 @@ void GhostServer::schedule(Answering&& answering) {
 std::int64_t GhostServer::dueNs(const Answering& answering) const {
   if (speed_ <= 0) return answering.beginNs;
   const auto after = answering.exchange->replies[answering.next].after;
-  return answering.beginNs + static_cast<std::int64_t>(static_cast<double>(after.count()) / speed_);
+  return answering.beginNs + replayedNs(after.count(), speed_);
 }
 
 void GhostServer::sendDue() {

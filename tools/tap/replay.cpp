@@ -21,6 +21,7 @@
 #include "tools/arguments.h"
 #include "tools/commands.h"
 #include "tools/tap/ghost.h"
+#include "tools/tap/pace.h"
 #include "tools/tap/recording.h"
 #include "tools/text/json_text.h"
 #include "tools/text/wrap.h"
@@ -110,8 +111,7 @@ class Replayer {
       startNs_ = nowNs;
     }
     if (arguments_.speed <= 0) return;
-    const auto dueNs = startNs_ + static_cast<std::int64_t>(static_cast<double>(atNs - firstAtNs_) /
-                                                            arguments_.speed);
+    const auto dueNs = startNs_ + replayedNs(atNs - firstAtNs_, arguments_.speed);
     while (!stopped_ && Clock::nowNs() < dueNs) dispatcher_.runOnce(Deadline::atNs(dueNs));
     late_->add(static_cast<std::uint64_t>(std::max<std::int64_t>(0, Clock::nowNs() - dueNs)));
   }

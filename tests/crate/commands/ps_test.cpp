@@ -33,6 +33,17 @@ TEST_F(PsTest, ShowsTheOtherCratesWhenOneDoesNotReply) {
   EXPECT_EQ(nlohmann::json::parse(reports.output).at(0).at("crate"), "lab");
 }
 
+TEST_F(PsTest, SaysThatASupervisorIsStopped) {
+  run(kServer);
+
+  supervisor_->stop();
+  const auto result = runCommand(MPF " ps 2>&1");
+  supervisor_->signal(SIGCONT);
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 1);
+  EXPECT_THAT(result.output, HasSubstr("is stopped; `kill -CONT "));
+}
+
 class LogsTest : public SupervisorTest {
  protected:
   LogsTest() { folder().create(); }

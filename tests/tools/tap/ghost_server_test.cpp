@@ -101,6 +101,20 @@ TEST_F(GhostServerTest, HasNoDelaysAtSpeedZero) {
   EXPECT_EQ(valueOf(next()), 2);
 }
 
+TEST_F(GhostServerTest, IsSlowAtAnySpeedAboveZero) {
+  recording_.open(1, "dac");
+  recording_.request(1, 1, 0ms, command(1));
+  recording_.reply(1, 1, std::chrono::hours(1), value(1));
+  recording_.request(1, 2, 0ms, command(2));
+  recording_.reply(1, 2, 0ms, value(2));
+  start(1e-300);
+
+  send(1);
+  send(2);
+
+  EXPECT_EQ(valueOf(next()), 2);
+}
+
 TEST_F(GhostServerTest, RefusesAndStaysSilentAsRecorded) {
   recording_.open(1, "dac");
   recording_.request(1, 1, 0ms, command(1));
