@@ -30,7 +30,7 @@ except ImportError as error:  # its cause is the reason, for example a sub-inter
     raise error.__cause__ or error
 from mpf.aio import AsyncClient
 from mpf.aio_requests import AsyncRequest, AsyncSubscription
-from mpf.client import Client, Subscription
+from mpf.client import Client
 from mpf.errors import (
     Cancelled,
     Error,
@@ -53,6 +53,7 @@ from mpf.errors import (
 from mpf.inspection import Ghost, Recording, Running, Tap, record, replay, servers, stats, tap
 from mpf.instruments import Gpib, Instrument, Serial
 from mpf.server import Server
+from mpf.subscription import Subscription
 
 __all__ = [
     "AsyncClient",

@@ -6,10 +6,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from types import TracebackType
-from typing import TYPE_CHECKING, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from mpf._mpf import Message, Request
-from mpf.errors import Error, is_end_of_server
+from mpf.errors import Error
+from mpf.subscription import SubscriptionBase
 
 if TYPE_CHECKING:
     from mpf.aio import AsyncClient
@@ -73,27 +74,8 @@ class AsyncRequest:
         return self._request.connected
 
 
-class AsyncSubscription(Generic[M]):
+class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
     """The replies to one request; AsyncClient.subscribe() creates it."""
-
-    def __init__(
-        self,
-        client: AsyncClient,
-        message: Message,
-        reply: type[Message] | None,
-        timeout: float,
-        limit: int,
-        renew: bool,
-    ) -> None:
-        self._client = client
-        self._message = message
-        self._reply = reply
-        self._timeout = timeout
-        self._limit = limit
-        self._renew = renew
-        self._request: Request | None = None
-        self._missed = 0
-        self._isClosed = False
 
     async def __aenter__(self: Self) -> Self:
         return self
@@ -118,11 +100,6 @@ class AsyncSubscription(Generic[M]):
                 self.close()
         raise StopAsyncIteration
 
-    @property
-    def missed(self) -> int:
-        """The number of replies that were dropped because the program did not take others."""
-        return self._missed + (self._request.missed if self._request else 0)
-
     def close(self) -> None:
         """Ends the iteration, and drops later replies. The server is not told."""
         self._isClosed = True
@@ -138,14 +115,12 @@ class AsyncSubscription(Generic[M]):
         request = await client._start(
             self._message, limit, reply=self._reply, further=self._limit
         )
-        self._request = request
-        if self._isClosed:
-            request.close()
+        self._begin(request)
         try:
             return cast(M, await client._end(request, limit, True))
         except Error as error:
             self._drop()
-            if self._isClosed or (self._renew and is_end_of_server(error)):
+            if self._hasEnded(error):
                 return None
             raise
 
@@ -162,8 +137,7 @@ class AsyncSubscription(Generic[M]):
         return None
 
     def _drop(self) -> None:
-        request, self._request = self._request, None
+        request = self._request
+        super()._drop()
         if request is not None:
-            self._missed += request.missed
-            request.close()
             self._client._wake(request.id)

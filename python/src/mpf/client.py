@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Client: calls of a server that wait for the reply, and subscriptions as iterators.
+"""Client: calls of a server that wait for the reply.
 
 Any number of threads may use one client at the same time. A call that waits releases the GIL, and
 Ctrl-C ends it.
@@ -8,14 +8,13 @@ Ctrl-C ends it.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
-from mpf.errors import Error, NotConnected, is_end_of_server
+from mpf.subscription import Subscription
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -26,7 +25,6 @@ Self = TypeVar("Self")
 
 #: Further replies that wait for a program, for each subscription.
 LIMIT = 1000
-_LOOK = 0.1  # [s] between looks whether a subscription that waits for its server was closed
 
 
 class Client(_mpf.BaseClient):
@@ -228,106 +226,3 @@ class Client(_mpf.BaseClient):
     ) -> Char8Array:
         """Calls with a Char8Array of these fields; `timeout` is that of call()."""
         return self.call(Char8Array(value, cmd=cmd, address=address, extra=extra), timeout)
-
-
-class Subscription(Generic[M]):
-    """The replies to one request, as an iterator; Client.subscribe() creates it."""
-
-    def __init__(
-        self,
-        client: Client,
-        message: Message,
-        reply: type[Message] | None,
-        timeout: float,
-        limit: int,
-        renew: bool,
-    ) -> None:
-        self._client = client
-        self._message = message
-        self._reply = reply
-        self._timeout = timeout
-        self._limit = limit
-        self._renew = renew
-        self._request: Request | None = None
-        self._missed = 0
-        self._isClosed = False
-
-    def __enter__(self: Self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def __iter__(self) -> Iterator[M]:
-        return self
-
-    def __next__(self) -> M:
-        while not self._isClosed:
-            message = self._first() if self._request is None else self._further()
-            if message is not None:
-                return message
-            if not self._renew:
-                self.close()
-        raise StopIteration
-
-    @property
-    def missed(self) -> int:
-        """The number of replies that were dropped because the program did not take others."""
-        return self._missed + (self._request.missed if self._request else 0)
-
-    def close(self) -> None:
-        """Ends the iteration, and drops later replies. The server is not told. Any thread."""
-        self._isClosed = True
-        self._drop()
-
-    def _first(self) -> M | None:
-        request = self._send()
-        if request is None:
-            return None
-        self._request = request
-        if self._isClosed:
-            request.close()
-        try:
-            return cast(M, request.wait())
-        except Error as error:
-            self._drop()
-            if self._isClosed or (self._renew and is_end_of_server(error)):
-                return None
-            raise
-
-    def _send(self) -> Request | None:
-        """Waits for the connection; returns None after close()."""
-        end = time.monotonic() + self._timeout
-        while not self._isClosed:
-            left = max(end - time.monotonic(), 0.0)
-            try:
-                return self._client._send(
-                    self._message, left, reply=self._reply, further=self._limit, waits=False
-                )
-            except NotConnected:
-                if left == 0.0:
-                    raise
-                self._client.wait_connected(min(left, _LOOK))
-        return None
-
-    def _further(self) -> M | None:
-        request = self._request
-        if request is None:  # another thread has closed the subscription
-            return None
-        message = request.next(self._timeout)
-        if message is None and request.connected:
-            raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
-        if message is None:
-            self._drop()
-        return cast("M | None", message)
-
-    def _drop(self) -> None:
-        request, self._request = self._request, None
-        if request is not None:
-            self._missed += request.missed
-            request.close()
