@@ -86,7 +86,7 @@ bool Binding::onLinkState() {
 }
 
 void Binding::onAccepted(Link& link) {
-  link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) % layout::kMaxLinks);
+  link.usePeerIndexOfServer();
   setState(BindingState::connected);
   MPF_STEP(connected);
   connector_.notifyConnected();

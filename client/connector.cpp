@@ -129,9 +129,7 @@ void Connector::closeLink(RequestSender& sender) {
   if (serverDied) count(endpoint.control().peersDied);
   link.setState(layout::LinkState::closed);
   // The server may have accepted the link after the last look at its state.
-  if (link.peerState() == layout::LinkState::open)
-    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) %
-                      layout::kMaxLinks);
+  if (link.peerState() == layout::LinkState::open) link.usePeerIndexOfServer();
   if (!serverDied) link.notifyPeer();
   removeBulk(endpoint.backplane().name(), link.header().incarnation);
   MPF_STEP(bulk_removed);
@@ -170,7 +168,7 @@ void Connector::publishPendingBind() {
   auto& endpoint = parts_.endpoint;
   auto pendingBind = std::make_unique<Segment>(
       Segment::create(layout::kHeaderBytes, layout::SegmentKind::pendingBind,
-                      endpoint.backplane().name(), {0644, ~std::uint32_t{0}}));
+                      endpoint.backplane().name(), kReadableByAll));
   auto& header = pendingBind->sharedHeader();
   header.ownerWindow = endpoint.window().header().incarnation;
   header.location = location_;

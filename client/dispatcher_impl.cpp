@@ -12,9 +12,6 @@ namespace mpf {
 namespace {
 
 constexpr int kBatch = 16;  // messages of one link before the next link has its turn
-// The mode of a client window before its first connection: all users may read it, as tools and
-// routers do.
-constexpr mode_t kReadableByAll = 0644;
 constexpr std::uint32_t kWakeupsPerClockCheck = 64;  // wake-ups without work between clock readings
 
 class DepthGuard {
@@ -31,8 +28,8 @@ class DepthGuard {
 }  // namespace
 
 Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
-    : parts_(std::move(backplane), layout::SegmentKind::clientWindow, std::string(),
-             Rights{.mode = kReadableByAll}, options.waitMode, [&](layout::SegmentHeader& header) {
+    : parts_(std::move(backplane), layout::SegmentKind::clientWindow, std::string(), kReadableByAll,
+             options.waitMode, [&](layout::SegmentHeader& header) {
                options.label.copy(header.name.data(), header.name.size() - 1);
              }) {}
 

@@ -10,8 +10,6 @@
 namespace mpf::router {
 namespace {
 
-constexpr mode_t kEverybodyReads = 0644;
-
 void zero(layout::RouterLine& line) noexcept {
   for (auto* count :
        {&line.connects, &line.queueSize, &line.inQueue, &line.queueFull, &line.messagesSent,
@@ -78,7 +76,7 @@ void PeerRecord::clear() noexcept {
 
 Statistics::Statistics(const Backplane& backplane, const std::string& name)
     : segment_(Segment::create(layout::kRouterBytes, layout::SegmentKind::router, backplane.name(),
-                               {kEverybodyReads, ~std::uint32_t{0}})) {
+                               kReadableByAll)) {
   segment_.lockForLife();
   auto& header = segment_.sharedHeader();
   name.copy(header.name.data(), header.name.size() - 1);

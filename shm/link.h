@@ -93,6 +93,10 @@ class Link {
   [[nodiscard]] const std::shared_ptr<PeerWindow>& peer() const noexcept { return peer_; }
   void attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept;
   void setPeerIndex(std::uint32_t peerIndex) noexcept { peerIndex_ = peerIndex; }
+  // The client's side, when the server has accepted the link.
+  void usePeerIndexOfServer() noexcept {
+    setPeerIndex(control().serverIndex.load(std::memory_order_relaxed) % layout::kMaxLinks);
+  }
 
   // The user of this side: Endpoint::attach() sets it.
   void setUser(LinkUser& user) noexcept { user_ = &user; }

@@ -39,6 +39,9 @@ namespace mpf {
 //           a file to it
 void setRights(int fd, const Rights& rights);
 
+// All users may read the segment, as tools and routers do.
+inline constexpr Rights kReadableByAll{.mode = 0644};
+
 class Segment {
  public:
   using Access = Mapping::Access;

@@ -88,8 +88,8 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
                      const std::string& name, Rights rights,
                      const std::function<void(layout::SegmentHeader&)>& describe)
     : backplane_(backplane), rights_(rights), admitted_(rights) {
-  window_ =
-      Segment::create(layout::kWindowBytes, kind, backplane, {rights.mode & 0644, rights.group});
+  window_ = Segment::create(layout::kWindowBytes, kind, backplane,
+                            {rights.mode & kReadableByAll.mode, rights.group});
   window_.lockForLife();
   MPF_STEP(window_locked);
   auto& header = window_.sharedHeader();

@@ -40,7 +40,8 @@ Crate showStartup(const RunArguments& arguments) {
   auto startup = arguments.source.readStartup("ioc.cmd", false);
   printDiagnostics(startup.diagnostics, arguments.checkOnly);
   if (arguments.checkOnly)
-    fmt::print("{} commands, {} of them skipped\n", startup.commands, startup.skipped);
+    fmt::print("{} commands, {} of them skipped\n", startup.commands,
+               startup.diagnostics.skipped());
   return std::move(startup.crate);
 }
 

@@ -71,7 +71,7 @@ class Peer final : LinkUser {
       endpoint_.wait(Deadline::after(5ms));
       static_cast<void>(endpoint_.next());
     }
-    link->setPeerIndex(link->control().serverIndex.load(std::memory_order_relaxed));
+    link->usePeerIndexOfServer();
     return link;
   }
   std::unique_ptr<Link> accept(std::uint32_t index) {

@@ -25,7 +25,7 @@ class ServerCoreTest : public ShmTest {
     link_->peer()->knock(link_->header().incarnation);
     EXPECT_FALSE(server_->receive());
     EXPECT_EQ(link_->peerState(), layout::LinkState::open);
-    link_->setPeerIndex(link_->control().serverIndex.load(std::memory_order_relaxed));
+    link_->usePeerIndexOfServer();
   }
   Link* createLink() {
     auto& endpoint = client_->endpoint;

@@ -47,7 +47,10 @@ class CommandCall {
   // Reports an error at an argument.
   void refuse(std::size_t index, const std::string& text);
   void warn(const std::string& text) { shell_.report(Severity::warning, command_, text); }
-  void note(const std::string& text) { shell_.report(Severity::note, command_, text); }
+  // Says that this command, or the part of it that `what` names, is not executed, and why.
+  void skip(Severity severity, const std::string& what, const std::string& why) {
+    shell_.reportSkipped(severity, command_, what + " is skipped: " + why);
+  }
 
   [[nodiscard]] const std::string& commandName() const noexcept { return command_.name; }
   [[nodiscard]] std::string place() const { return command_.place.text(); }

@@ -28,8 +28,8 @@ std::string findFile(CommandCall& call, const std::string& file, std::size_t fol
     if (fs::is_regular_file(path, error)) return path.string();
     tried.push_back(path.string());
   }
-  call.warn(fmt::format("{}: there is no file {}; it is skipped (looked for {})",
-                        call.commandName(), file, fmt::join(tried, ", ")));
+  call.skip(Severity::warning, call.commandName() + " of " + file,
+            fmt::format("there is no such file (looked for {})", fmt::join(tried, ", ")));
   return {};
 }
 
@@ -52,7 +52,7 @@ Value dbLoadDatabase(CommandCall& call, StartupSite& site) {
   const auto file = call.text(0, "file");
   if (!call.isValid()) return Value::unavailable();
   if (!file.ends_with(".dbd")) return loadRecords(call, site, 2, 1);
-  call.note(fmt::format("{} is skipped: mpf-ioc has its own record types", file));
+  call.skip(Severity::note, call.commandName() + " of " + file, "mpf-ioc has its own record types");
   return Value();
 }
 

@@ -176,9 +176,8 @@ Value initIp330Pid(CommandCall& call, StartupSite& site) {
 
 // configIp330PID(pid, KP, KI, KD, us, feedbackOn, low, high) existed until R1-7.
 Value configIp330Pid(CommandCall& call, StartupSite& /*site*/) {
-  call.warn(
-      "configIp330PID is skipped: clients set the parameters of a feedback, such as the "
-      "records of ip330_pid.db");
+  call.skip(Severity::warning, "configIp330PID",
+            "clients set the parameters of a feedback, such as the records of ip330_pid.db");
   return Value();
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Commands that MPF knows and does not execute: what it has no program for, and what has no meaning
 // outside vxWorks.
-#include <fmt/format.h>
-
 #include "crate/startup/commands/command_table.h"
 
 namespace mpf::startup {
@@ -10,20 +8,19 @@ namespace {
 
 // Servers of other packages that used MPF.
 Value skipServer(CommandCall& call, StartupSite& /*site*/) {
-  call.warn(
-      fmt::format("{} is skipped: it starts a server of another package; port its source "
-                  "with <mpf/classic.h> and add the program to the crate file",
-                  call.commandName()));
+  call.skip(Severity::warning, call.commandName(),
+            "it starts a server of another package; port its source with <mpf/classic.h> and add "
+            "the program to the crate file");
   return Value::unavailable();
 }
 
 Value skip(CommandCall& call, StartupSite& /*site*/) {
-  call.note(fmt::format("{} is skipped: it has no meaning here", call.commandName()));
+  call.skip(Severity::note, call.commandName(), "it has no meaning here");
   return Value();
 }
 
 Value skipSequence(CommandCall& call, StartupSite& /*site*/) {
-  call.warn("seq is skipped: mpf-ioc has no state notation programs");
+  call.skip(Severity::warning, "seq", "mpf-ioc has no state notation programs");
   return Value();
 }
 

@@ -83,13 +83,6 @@ void addLocalLocation(crate::Process& router, std::int32_t location) {
     setValue(router, "serve", fmt::format("{}={}", serve->values.front(), location), serve->place);
 }
 
-// Each command that is skipped says so.
-int countSkipped(const Diagnostics& diagnostics) {
-  return static_cast<int>(std::ranges::count_if(diagnostics.all(), [](const auto& diagnostic) {
-    return diagnostic.text.find("skipped") != std::string::npos;
-  }));
-}
-
 crate::Crate crateOf(StartupSite& site, const StartupOptions& options, const fs::path& file,
                      const std::map<std::string, std::string>& environment) {
   crate::Crate crate;
@@ -127,7 +120,7 @@ Startup readStartup(const std::string& file, const StartupOptions& options) {
   errors.throwIfAny();
   Startup startup{crateOf(site, options, path, shell.environment()),
                   site.ioc.isNeeded() ? site.ioc.text() : "", shell.diagnostics(),
-                  commands.commands, countSkipped(shell.diagnostics())};
+                  commands.commands};
   if (startup.crate.processes.empty())
     errors.add(path.string(), "no command of the file starts a server, a router or an IOC");
   else checkCrate(startup.crate, errors);

@@ -28,8 +28,7 @@ struct Startup {
   crate::Crate crate;
   std::string iocText;  // empty: the file needs no IOC
   Diagnostics diagnostics;  // no errors
-  int commands = 0;  // that are not of the shell
-  int skipped = 0;  // of these; each has a warning or a note
+  int commands = 0;  // that are not of the shell; diagnostics.skipped() of them are not executed
 };
 
 //   throws  ConfigError with all errors, each with file, line and column

@@ -44,6 +44,9 @@ class Diagnostics {
   static constexpr std::size_t kMaxKept = 1000;
 
   void add(Diagnostic diagnostic);
+  // Counts a command that is not executed.
+  void countSkipped() noexcept { ++skipped_; }
+  [[nodiscard]] int skipped() const noexcept { return skipped_; }
   [[nodiscard]] const std::vector<Diagnostic>& all() const noexcept { return all_; }
   [[nodiscard]] std::size_t count(Severity severity) const noexcept;
   [[nodiscard]] bool hasErrors() const noexcept { return count(Severity::error) > 0; }
@@ -51,6 +54,7 @@ class Diagnostics {
  private:
   std::vector<Diagnostic> all_;
   std::size_t counts_[3]{};  // by Severity, with those that are not kept
+  int skipped_ = 0;
 };
 
 }  // namespace mpf::startup

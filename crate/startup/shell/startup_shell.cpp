@@ -78,6 +78,7 @@ class StartupShell::Execution final : public LineActions {
     if (auto result = tryStringFunction(command, shell_.state_, *this)) return *result;
     if (auto result = tryShellCommand(command, shell_.state_, *this)) return *result;
     if (auto result = shell_.handler_.tryExecute(command, shell_)) return *result;
+    shell_.diagnostics_.countSkipped();
     report(Severity::warning, column, "unknown command " + name + "; it is skipped");
     return Value::unavailable();
   }
@@ -180,6 +181,12 @@ void StartupShell::executeFile(const std::filesystem::path& file, const Executio
 
 void StartupShell::report(Severity severity, const Command& command, const std::string& text) {
   diagnostics_.add({severity, command.place, command.includedFrom, text, command.text});
+}
+
+void StartupShell::reportSkipped(Severity severity, const Command& command,
+                                 const std::string& text) {
+  diagnostics_.countSkipped();
+  report(severity, command, text);
 }
 
 void StartupShell::reportArgument(Severity severity, const Command& command, std::size_t index,

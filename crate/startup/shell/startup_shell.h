@@ -125,6 +125,8 @@ class StartupShell {
 
   // Reports something about a command, at its name or at one of its arguments (from 0).
   void report(Severity severity, const Command& command, const std::string& text);
+  // The same for a command that is not executed; the text says that it is skipped, and why.
+  void reportSkipped(Severity severity, const Command& command, const std::string& text);
   void reportArgument(Severity severity, const Command& command, std::size_t index,
                       const std::string& text);
 

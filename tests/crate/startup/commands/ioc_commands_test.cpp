@@ -43,11 +43,10 @@ TEST_F(IocCommands, DbLoadDatabaseLoadsRecordsUnlessItDescribesTypes) {
 
 TEST_F(IocCommands, AFileThatDoesNotExistIsSkippedAndNamed) {
   const auto startup = read("dbLoadRecords(\"none.db\", \"P=x:\", ip)\niocInit\n");
-  EXPECT_THAT(
-      remarksOf(startup),
-      ElementsAre(HasSubstr("dbLoadRecords: there is no file none.db; it is skipped (looked "
-                            "for " +
-                            folder_.file("none.db"))));
+  EXPECT_THAT(remarksOf(startup),
+              ElementsAre(HasSubstr(
+                  "dbLoadRecords of none.db is skipped: there is no such file (looked for " +
+                  folder_.file("none.db"))));
 }
 
 TEST_F(IocCommands, TheIocIsAProcessWithTheEnvironmentOfTheFile) {

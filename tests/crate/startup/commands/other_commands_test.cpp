@@ -20,6 +20,7 @@ TEST_F(OtherCommands, AreSkippedWithTheReason) {
       ElementsAre("ld is skipped: it has no meaning here",
                   HasSubstr("AIMConfig is skipped: it starts a server of another package"),
                   HasSubstr("seq is skipped"), "unknown command motorSetup; it is skipped"));
+  EXPECT_EQ(startup.diagnostics.skipped(), 4);
 }
 
 }  // namespace
