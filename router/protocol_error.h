@@ -2,6 +2,7 @@
 // ProtocolError: a violation of the protocol or of a limit by the peer, which ends the connection.
 #pragma once
 
+#include <kj/time.h>
 #include <stdexcept>
 
 #include "schema/router.capnp.h"
@@ -9,6 +10,9 @@
 namespace mpf::router {
 
 using FarewellCode = wire::Farewell::Code;
+
+// How long a peer has to receive a farewell and to close the connection.
+inline constexpr auto kFarewellTime = 500 * kj::MILLISECONDS;
 
 class ProtocolError : public std::runtime_error {
  public:

@@ -35,7 +35,7 @@ Line::Line(kj::Own<kj::AsyncIoStream> stream, kj::Timer& timer, const Limits& li
 
 // ---- start and end
 
-kj::Promise<LineEnd> Line::run(Note greeting) {
+kj::Promise<LineEnd> Line::run(FillItem greeting) {
   auto paf = kj::newPromiseAndFulfiller<LineEnd>();
   ended_ = kj::mv(paf.fulfiller);
   keepAlive_.start(Clock::nowNs());
@@ -149,8 +149,8 @@ bool Line::handleSome() {
   constexpr capnp::uint kItemsPerCheck = 16;  // between two looks at the clock
   const auto endNs = Clock::nowNs() + kTurnNs;
   if (items_) keepAlive_.received(Clock::nowNs());  // the peer is not late: its items were waiting
-  noteKind_ = SendQueue::NoteKind::answer;
-  KJ_DEFER(noteKind_ = SendQueue::NoteKind::own);
+  origin_ = SendQueue::Origin::answer;
+  KJ_DEFER(origin_ = SendQueue::Origin::own);
   NoticeBatch notices;
   capnp::uint handled = 0;  // items and frames, since the last look
   while (!queue_.hasMaxAnswers()) {
@@ -260,8 +260,8 @@ void Line::takeGreeting(wire::Greeting::Reader greeting) {
 
 // ---- writing
 
-void Line::send(Note note) {
-  if (!isEnding()) enqueue(std::move(note), noteKind_);
+void Line::send(FillItem fill) {
+  if (!isEnding()) enqueue(std::move(fill), origin_);
 }
 
 void Line::send(Carried carried) {

@@ -48,7 +48,7 @@ struct LineEnd {
 
 class Line {
  public:
-  using Note = SendQueue::Note;
+  using FillItem = SendQueue::FillItem;
 
   // What the line reports to the object that made it.
   struct Events {
@@ -79,14 +79,14 @@ class Line {
   Line& operator=(const Line&) = delete;
 
   // Sends the greeting, and runs until the line ends. Call it once.
-  [[nodiscard]] kj::Promise<LineEnd> run(Note greeting);
+  [[nodiscard]] kj::Promise<LineEnd> run(FillItem greeting);
   // Ends the line with a farewell, behind the items that wait. The line is finished when the peer
   // has also closed the connection, at the latest after kFarewellTime.
   void end(FarewellCode code, const std::string& why);
 
   // Queues an item that is not a message, even without room. Answers to items of the peer are
   // bounded: when too many wait, no more is read from the peer.
-  void send(Note note);
+  void send(FillItem fill);
   // Queues a message, even without room. A caller that can wait checks hasRoom() first.
   void send(Carried carried);
   void send(const PlainOutgoing& item);
@@ -111,7 +111,6 @@ class Line {
 
  private:
   enum class State { greeting, open, leaving, dropping, broken, finished };
-  static constexpr auto kFarewellTime = 500 * kj::MILLISECONDS;
 
   [[nodiscard]] bool isEnding() const noexcept {
     return state_ != State::greeting && state_ != State::open;
@@ -161,7 +160,7 @@ class Line {
   bool hasHandled_ = false;  // an item, since the last onHandled()
   SendQueue queue_;
   // Notes that are sent while items of the peer are handled are answers.
-  SendQueue::NoteKind noteKind_ = SendQueue::NoteKind::own;
+  SendQueue::Origin origin_ = SendQueue::Origin::own;
   KeepAlive keepAlive_;
   std::string farewell_;  // the text of our farewell
   kj::Own<kj::PromiseFulfiller<LineEnd>> ended_;

@@ -10,8 +10,6 @@
 namespace mpf::router {
 namespace {
 
-constexpr auto kFarewellTime = 500 * kj::MILLISECONDS;
-
 // Discards what the peer sends. If it stayed unread, the kernel would reset the connection, and the
 // peer might not receive the farewell.
 kj::Promise<void> readToEnd(kj::AsyncIoStream& caller) {

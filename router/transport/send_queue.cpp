@@ -58,10 +58,10 @@ SendQueue::SendQueue(std::uint32_t queueSize, PeerRecord& record)
   record_->queueSize.store(queueSize, std::memory_order_relaxed);
 }
 
-void SendQueue::push(Note note, NoteKind kind) {
-  queue_.emplace_back(KindedNote{kind, std::move(note)});
-  ++notes_;
-  if (kind == NoteKind::answer) ++answers_;
+void SendQueue::push(FillItem fill, Origin origin) {
+  queue_.emplace_back(ControlItem{origin, std::move(fill)});
+  ++controlItems_;
+  if (origin == Origin::answer) ++answers_;
 }
 
 void SendQueue::push(Carried carried) {
@@ -176,10 +176,10 @@ std::size_t SendQueue::buildOtherFrame(const FrameLimits& limits,
   for (capnp::uint at = 0; at < items; ++at) {
     auto outgoing = std::move(queue_.front());
     queue_.pop_front();
-    if (auto* note = std::get_if<KindedNote>(&outgoing)) {
-      --notes_;
-      if (note->kind == NoteKind::answer) --answers_;
-      note->fill(list[at]);
+    if (auto* item = std::get_if<ControlItem>(&outgoing)) {
+      --controlItems_;
+      if (item->origin == Origin::answer) --answers_;
+      item->fill(list[at]);
     } else {
       --messages_;
       fill(list[at], std::get<Carried>(outgoing), limits.messageBytes, onUnsendable);
@@ -230,7 +230,7 @@ std::vector<Carried> SendQueue::takeUnsentRequests() {
     }
   }
   queue_.clear();
-  messages_ = notes_ = answers_ = 0;
+  messages_ = controlItems_ = answers_ = 0;
   std::ranges::move(std::exchange(rejectedRequests_, {}), std::back_inserter(requests));
   return requests;
 }

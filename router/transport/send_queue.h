@@ -31,8 +31,8 @@ namespace mpf::router {
 class SendQueue {
  public:
   // Fills in an item that is not a message, when its frame is built.
-  using Note = std::function<void(wire::Item::Builder)>;
-  enum class NoteKind {
+  using FillItem = std::function<void(wire::Item::Builder)>;
+  enum class Origin {
     own,  // begun by this side
     answer,  // to an item of the peer
   };
@@ -45,13 +45,13 @@ class SendQueue {
     std::size_t bytes = 0;  // a single item, or the last frame of several, may be longer
     std::uint64_t messageBytes = 0;  // longer messages are unsendable
   };
-  static constexpr std::size_t kMaxNotes = 4096;
+  static constexpr std::size_t kMaxControlItems = 4096;
 
   //   queueSize  messages that may wait
   SendQueue(std::uint32_t queueSize, PeerRecord& record);
 
   // Append an item, also when hasRoom() is false.
-  void push(Note note, NoteKind kind);
+  void push(FillItem fill, Origin origin);
   void push(Carried carried);
   void push(const PlainOutgoing& item);
   void push(const PlainItems& items);
@@ -61,11 +61,11 @@ class SendQueue {
 
   // For how many messages there is room.
   [[nodiscard]] std::size_t room() const noexcept {
-    return messages_ < queueSize_ && notes_ < kMaxNotes ? queueSize_ - messages_ : 0;
+    return messages_ < queueSize_ && controlItems_ < kMaxControlItems ? queueSize_ - messages_ : 0;
   }
   [[nodiscard]] bool hasRoom() const noexcept { return room() != 0; }
   // Whether so many answers wait that no more items of the peer should be handled.
-  [[nodiscard]] bool hasMaxAnswers() const noexcept { return answers_ >= kMaxNotes; }
+  [[nodiscard]] bool hasMaxAnswers() const noexcept { return answers_ >= kMaxControlItems; }
   [[nodiscard]] bool isEmpty() const noexcept { return queue_.empty(); }
   // Whether no item waits and no frame is being written.
   [[nodiscard]] bool isIdle() const noexcept { return isEmpty() && pieces_.empty(); }
@@ -81,12 +81,12 @@ class SendQueue {
   [[nodiscard]] std::vector<Carried> takeUnsentRequests();
 
  private:
-  struct KindedNote {
-    NoteKind kind;
-    Note fill;
+  struct ControlItem {
+    Origin origin;
+    FillItem fill;
   };
   using Run = std::unique_ptr<PlainRun>;
-  using Outgoing = std::variant<KindedNote, Carried, Run>;
+  using Outgoing = std::variant<ControlItem, Carried, Run>;
   struct FrameSize {
     std::size_t items;
     std::size_t bytes;  // an estimate
@@ -104,7 +104,7 @@ class SendQueue {
   PeerRecord& record_;
   std::deque<Outgoing> queue_;
   std::size_t messages_ = 0;  // in queue_
-  std::size_t notes_ = 0;  // in queue_
+  std::size_t controlItems_ = 0;  // in queue_
   std::size_t answers_ = 0;  // of these, answers
   std::vector<Carried> rejectedRequests_;
   kj::Array<capnp::word> scratch_;  // memory for frames, kept from frame to frame

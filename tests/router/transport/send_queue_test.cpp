@@ -18,7 +18,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
-using NoteKind = SendQueue::NoteKind;
+using Origin = SendQueue::Origin;
 
 class SendQueueTest : public testing::Test {
  public:
@@ -46,7 +46,7 @@ class SendQueueTest : public testing::Test {
     }
     return texts;
   }
-  static SendQueue::Note close(std::uint32_t number) {
+  static SendQueue::FillItem close(std::uint32_t number) {
     return [number](wire::Item::Builder item) { item.setClose(number); };
   }
   static Carried request(std::uint32_t id) {
@@ -73,9 +73,9 @@ class SendQueueTest : public testing::Test {
 };
 
 TEST_F(SendQueueTest, PutsAllThatWaitsIntoOneFrameInItsOrder) {
-  queue_.push(close(1), NoteKind::own);
+  queue_.push(close(1), Origin::own);
   queue_.push(request(2));
-  queue_.push(close(3), NoteKind::answer);
+  queue_.push(close(3), Origin::answer);
 
   EXPECT_THAT(frames(), ElementsAre("(close = 1)", HasSubstr("requestId = 2"), "(close = 3)"));
   EXPECT_TRUE(queue_.isEmpty());
@@ -127,9 +127,9 @@ TEST_F(SendQueueTest, ARepliesMissedMessagesAreSentWithIt) {
 }
 
 TEST_F(SendQueueTest, AWriteHasOneFrameOfOtherItems) {
-  queue_.push(close(1), NoteKind::own);
+  queue_.push(close(1), Origin::own);
   queue_.push(plain(2));
-  queue_.push(close(3), NoteKind::own);
+  queue_.push(close(3), Origin::own);
 
   EXPECT_THAT(frames(), ElementsAre("(close = 1)", HasSubstr("requestId = 2")));
   EXPECT_THAT(frames(), ElementsAre("(close = 3)"));
@@ -164,7 +164,7 @@ TEST_F(SendQueueTest, RunsDoNotMix) {
 TEST_F(SendQueueTest, IsIdleWhenItsLastFrameIsWritten) {
   EXPECT_TRUE(queue_.isIdle());
 
-  queue_.push(close(1), NoteKind::own);
+  queue_.push(close(1), Origin::own);
   EXPECT_FALSE(queue_.isIdle());
   frames();
   EXPECT_FALSE(queue_.isIdle()) << "the frame is being written";
@@ -185,7 +185,7 @@ TEST_F(SendQueueTest, AFrameIsLimitedInItemsAndBytes) {
 TEST_F(SendQueueTest, FramesDoNotMix) {
   queue_.push(array(1, 900));
   frames();
-  queue_.push(close(2), NoteKind::own);
+  queue_.push(close(2), Origin::own);
 
   EXPECT_THAT(frames(), ElementsAre("(close = 2)"));
 }
@@ -206,17 +206,18 @@ TEST_F(SendQueueTest, HasNoRoomWhileTooManyMessagesWait) {
 }
 
 TEST_F(SendQueueTest, HasNoRoomWhileTooManyNotesWait) {
-  for (std::size_t i = 1; i < SendQueue::kMaxNotes; ++i) queue_.push(close(1), NoteKind::own);
+  for (std::size_t i = 1; i < SendQueue::kMaxControlItems; ++i) queue_.push(close(1), Origin::own);
   EXPECT_TRUE(queue_.hasRoom());
 
-  queue_.push(close(1), NoteKind::own);
+  queue_.push(close(1), Origin::own);
 
   EXPECT_FALSE(queue_.hasRoom());
   EXPECT_FALSE(queue_.hasMaxAnswers());
 }
 
 TEST_F(SendQueueTest, CountsAnswersUntilTheyAreInAFrame) {
-  for (std::size_t i = 0; i < SendQueue::kMaxNotes; ++i) queue_.push(close(1), NoteKind::answer);
+  for (std::size_t i = 0; i < SendQueue::kMaxControlItems; ++i)
+    queue_.push(close(1), Origin::answer);
   EXPECT_TRUE(queue_.hasMaxAnswers());
 
   frames(1);
@@ -236,7 +237,7 @@ TEST_F(SendQueueTest, ReturnsTheRequestsThatAreInNoFrame) {
   queue_.push(request(1));
   frames();
   queue_.push(request(2));
-  queue_.push(close(1), NoteKind::own);
+  queue_.push(close(1), Origin::own);
   queue_.push(Carried{.requestId = 3, .message = Int32Message({.value = 0})});  // a reply
   queue_.reject(request(4));
   queue_.reject(Carried{.requestId = 5, .message = Int32Message({.value = 0})});
