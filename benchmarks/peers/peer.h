@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Peer: a system that carries messages from one process to another and back. MPF is one of them.
+// Peer: a system that carries messages from one process to another and back. MPF is one of them,
+// and is compared with the others. (A peer is not the other end of a connection here.)
 //
 // The runner creates the object before it forks, so it may hold names but no resources. Then
 // serve() or sink() runs in the server's process, and connect() and the other functions in the

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Commands of the IOC shell: reports, and the client side of the startup files of the old MPF
-// (manual, "Using MPF in Applications").
+// Commands of the IOC shell: reports, and the client side of the startup files of the original
+// MPF (manual, "Using MPF in Applications").
 #include <fcntl.h>
 #include <unistd.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Backplane: the name by which processes on one host find each other. Clients find the servers of
-// their own backplane only.
+// Backplane: a named set of processes on one host. Clients find only servers on their own
+// backplane.
 //
 //   auto backplane = mpf::Backplane::attach();  // MPF_BACKPLANE, or "default"
 //   mpf::MessageServer server(backplane, "echo");
@@ -27,9 +27,9 @@ class Watcher;  // internal
 
 class Backplane {
  public:
-  // Attaches to the backplane `name`, and removes segments of dead processes; if the backplane has
-  // more than 1024 files, those of a random choice. No other process needs to use this backplane
-  // yet.
+  // Attaches to the backplane `name`, which need not have any process yet, and removes the segments
+  // of dead processes. If the backplane has more than 1024 files, it examines 1024 of them, chosen
+  // at random.
   //   name    1 to 39 of the characters A-Z a-z 0-9 _ -; empty: the environment variable
   //           MPF_BACKPLANE, or "default" if that is not set
   //   throws  std::invalid_argument if the name is invalid, std::system_error if /dev/shm cannot be

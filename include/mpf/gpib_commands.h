@@ -38,7 +38,8 @@ namespace mpf::gpib {
 
 // `cmd` of a request: one command, OR-ed with any options.
 
-// Reads until END, the end of string or `extra` bytes; extra 0: the server's buffer size.
+// Reads until END (the EOI line), the end of string or `extra` bytes; extra 0: the server's buffer
+// size.
 inline constexpr std::int32_t cmdRead = 1;
 // Writes `value`, the last byte with END.
 inline constexpr std::int32_t cmdWrite = 2;
@@ -76,8 +77,8 @@ inline constexpr std::int32_t cmdLeaseHolder = 14;
 
 // From now on, when the instrument requests service, the server polls it and sends an OutOfBand
 // message with cmd = cmdSubscribe, address, and value = status byte. extra = number of such
-// messages that are missing before, because this client did not receive them in time. The same
-// message comes when somebody's cmdSerialPoll returns a status byte that requests service. Does not
+// messages that are missing before, because this client did not take them in time. The same message
+// is sent when a cmdSerialPoll of any client returns a status byte that requests service. Does not
 // wait for the bus. During a lease, the server polls only instruments to which the holder
 // subscribes.
 inline constexpr std::int32_t cmdSubscribe = 15;
@@ -86,7 +87,9 @@ inline constexpr std::int32_t cmdUnsubscribe = 16;
 // The bits of the command; the others are options.
 inline constexpr std::int32_t cmdCommandMask = 0xff;
 
-// Options. `timeout` is in milliseconds instead of seconds.
+// Options.
+
+// `timeout` is in milliseconds instead of seconds.
 inline constexpr std::int32_t cmdTimeoutMilliseconds = 0x100;
 // Writes the last byte without END. Not for cmdWriteRead.
 inline constexpr std::int32_t cmdWithoutEnd = 0x200;

@@ -9,7 +9,8 @@
 //     Int32 cmd=cmdSniffStop  ──►
 //                             ◄── Int32 status=sniffStatusOK address=0    the last message
 //
-// A controller that sends the commands of the bus by itself (Prologix, USBTMC) shows the data only.
+// A controller that sends the commands of the bus automatically (Prologix, USBTMC) shows the data
+// only.
 //
 // Source   manual, "Diagnostic Aids": gpibSniff. The messages are those of this project.
 #pragma once

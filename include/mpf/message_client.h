@@ -37,9 +37,9 @@ namespace mpf {
 
 // The result of a send.
 enum class SendResult {
-  sent,  // the server will receive the request, or the request gets a fate
+  sent,  // the request will end in a reply or a fate
   notConnected,  // see MessageClient::notConnectedBecause()
-  queueFull,  // the server has not received the earlier requests yet
+  queueFull,  // the server has not taken the earlier requests yet
   tooManyOutstanding,  // too many requests without a reply
   tooLarge,  // larger than MessageClient::maxMessageBytes()
   noMemory,  // the shared memory of the connection, or /dev/shm, is full
@@ -54,11 +54,11 @@ struct SentMany {
   SendResult result = SendResult::sent;  // why the next one was not; `sent` when all were
 };
 
-// Which requests a client sends again by itself.
+// Which requests a client resends automatically.
 enum class Retry {
   never,
   // Those whose fate would be neverTaken, for example because the server was stopped or replaced.
-  // They go to the next server of the name. No request is executed twice by it.
+  // They go to the next server with this name. No request is executed twice because of this.
   neverTaken
 };
 
@@ -117,28 +117,28 @@ class MessageClient {
 
   // Sends `message` and empties it. When the result is not `sent`, the message is unchanged. Never
   // waits.
-  //   takeBefore  a request that the server has not received by then ends as `expired`
+  //   takeBefore  a request that the server has not taken by then ends as `expired`
   //   requestId   out, unless null: the number of the request, for cancel() and in its fate
   //   retry       with neverTaken, the client keeps a copy, made by duplicate(), until the request
-  //               ends. If no server receives the request, the client sends it again when it is
+  //               ends. If no server takes the request, the client sends it again when it is
   //               connected again, under the same number and with the same deadline. While such
   //               requests wait, send() returns `queueFull`, so that requests keep their order
   [[nodiscard]] SendResult send(Message&& message, Deadline takeBefore = Deadline::never(),
                                 std::uint32_t* requestId = nullptr,
                                 Retry retry = Retry::never) noexcept;
 
-  // Sends the messages in order, until one is not sent. A server that sleeps is woken once at most
-  // for all of them. Messages that were sent are empty then; the others are unchanged. Never
-  // waits, and never sends again by itself.
+  // Sends the messages in order, until one is not sent. A sleeping server is woken at most once.
+  // Messages that were sent are empty afterwards; the others are unchanged. Never waits, and never
+  // resends.
   //   takeBefore  as send(), for each message
   //   requestIds  out: the numbers of the requests that were sent; may be shorter, and is then
   //               filled as far as it goes
   SentMany sendMany(std::span<Message> messages, Deadline takeBefore = Deadline::never(),
                     std::span<std::uint32_t> requestIds = {}) noexcept;
 
-  // Sends each of `values` as a request, in order, until one is not sent: for a client with many
-  // small requests. If T is Int32 or OutOfBand, faster than a message for each of them while both
-  // sides poll. The clientType and clientExtra of the requests are 0: a field of the value must
+  // Sends each of `values` as a request, in order, until one is not sent. Use it for many small
+  // requests: if T is Int32 or OutOfBand and both sides poll, it is faster than sendMany() of
+  // messages. The clientType and clientExtra of the requests are 0: a field of the value must
   // identify the request in its reply, and its number identifies it in a fate.
   //
   //   const auto sent = client.sendMany<mpf::Int32>(settings);  // std::vector<mpf::Int32> settings
@@ -152,9 +152,9 @@ class MessageClient {
     return sendBodies(T::kType, sizeof(T), std::as_bytes(values), takeBefore, requestIds);
   }
 
-  // Allocates an array message of n elements in the memory that is shared with the server, or on
-  // the heap when there is no connection or the shared memory is full. Sending the former copies
-  // nothing.
+  // Allocates an array message of n elements in the memory that is shared with the server. Sending
+  // it copies nothing. Without a connection, or when the shared memory is full, the message is on
+  // the heap, and sending it copies it.
   //   throws  std::bad_alloc; std::length_error when n is above 2^32 - 1
   template <ArrayBody T>
   [[nodiscard]] MessageOf<T> alloc(std::size_t n) {
@@ -165,15 +165,15 @@ class MessageClient {
   // on the request, which counts as outstanding until the server has replied to it or refused it.
   // Called in a callback, cancel() delivers the fate before it returns; otherwise the dispatcher
   // delivers it when it runs next, before any reply.
-  //   throws  in a callback: what the callback throws that gets the fate
+  //   throws  in a callback: the exception of the callback that receives the fate
   void cancel(std::uint32_t requestId);
 
   // --- the connection
 
-  // Waits until the client is connected; returns false after `timeout`. It runs the
-  // dispatcher meanwhile, unless the dispatcher has a thread, or another thread runs it or ran it
-  // last: then it waits for that thread. SyncClient::connectWait() always runs its dispatcher.
-  //   throws  what a callback throws that it runs
+  // Waits until the client is connected; returns false after `timeout`. If the dispatcher has a
+  // thread, or another thread runs it or ran it last, the call waits for that thread; otherwise it
+  // runs the dispatcher itself. SyncClient::connectWait() always runs its dispatcher.
+  //   throws  the exception of a callback that it runs
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
   [[nodiscard]] bool isConnected() const noexcept;
   // [bytes] The largest body that the server accepts; 0 without a connection.

@@ -15,8 +15,8 @@
 // A moved-from or sent MessageOf<T> is empty: only assignment, destruction and the test for
 // emptiness (operator bool) are allowed.
 //
-// A body that grows does not move to larger memory: getMaxLength() and getMaxSize() are fixed when
-// the body is allocated. If a reply has more elements than its request, the server allocates the
+// The memory of a body never grows: getMaxLength() and getMaxSize() are fixed when the body is
+// allocated. If a reply has more elements than its request, the server allocates the
 // reply with MessageServer::allocReplyMessage().
 //
 // Threads  as Message: one thread at a time uses a handle.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Route: where the reply to a message goes. RouteKeeper: is told if there will be no reply.
+// Route: where the reply to a message goes. RouteKeeper: is notified when a request will get no
+// reply.
 //
 // Programs need neither. Transports, which move messages between processes, use them through
 // <mpf/message.h>.

@@ -62,7 +62,7 @@ struct ServerOptions {
   bool stampsReplies = false;
   // [bytes] Memory of the messages made by allocShared(), together for all clients.
   std::uint64_t maxSharedBytes = 320ull << 20;
-  // Published messages that one client may hold, 1 to 64: those that it has not received and those
+  // Published messages that one client may hold, 1 to 64: those that it has not taken and those
   // whose handles it has not destroyed. Above this number, publish() drops messages for the client.
   int maxBorrowed = 4;
 };
@@ -71,7 +71,7 @@ struct ServerOptions {
 enum class ReplyResult {
   sent,
   clientGone,  // the client has disconnected or died, or the message is not a reply
-  queueFull,  // further replies only: the client has not received the earlier ones yet; publish()
+  queueFull,  // further replies only: the client has not taken the earlier ones yet; publish()
   // only: the client holds ServerOptions::maxBorrowed published messages
   tooLarge,  // larger than ServerOptions::maxMessageBytes
   noMemory  // the shared memory of the connection, that of publish(), or /dev/shm, is full
@@ -87,15 +87,15 @@ struct RepliedMany {
 
 class MessageServer {
  public:
-  // Publishes the server under `name`: clients can connect as soon as this object receives, and
-  // their requests wait in its queues.
-  //   throws  NameInUse when another process serves that name at that location, SegmentError when a
-  //           file in /dev/shm that is not a server has its place, std::invalid_argument when the
+  // Publishes the server under `name`. receive(), handleOne() and run() accept clients; requests of
+  // accepted clients wait in queues.
+  //   throws  NameInUse when another process serves that name at that location, SegmentError when
+  //           /dev/shm has a file of this name that is not a server, std::invalid_argument when the
   //           name or an option is invalid, std::system_error, for example ENOSPC when /dev/shm is
   //           full, EMFILE when the process has no file descriptor left
   MessageServer(const Backplane& backplane, const std::string& name,
                 const ServerOptions& options = {});
-  // Disconnects all clients. Requests that were not received end as `neverTaken`, others without a
+  // Disconnects all clients. Requests that were not taken end as `neverTaken`, others without a
   // reply as `outcomeUnknown`. Handles of requests may outlive the server.
   ~MessageServer();
   MessageServer(const MessageServer&) = delete;
@@ -110,9 +110,9 @@ class MessageServer {
   // Waits until receive() may have a request. Returns false when the deadline passed or interrupt()
   // was called.
   bool waitForMessage(Deadline deadline = Deadline::never());
-  // Returns the next request, or an empty handle when no request waits. Also accepts clients and
+  // Takes the next request; returns an empty handle when no request waits. Also accepts clients and
   // closes the connections of dead ones. A request whose deadline has passed ends as `expired` and
-  // is not returned. A request ends as `refused` when its handle is destroyed before a reply.
+  // is not taken. A request ends as `refused` when its handle is destroyed before a reply.
   //   throws  what the callback of onClient() throws; std::logic_error in the child of a fork
   Message receive();
   // Ends the call of waitForMessage() or run() that is in progress, or else the next one; waiting
@@ -146,20 +146,19 @@ class MessageServer {
   // Sends `message` to the client whose request it replies to. `message` is a request, changed or
   // not, or was made by allocReplyMessage(). sent and clientGone empty it; the other results leave
   // it unchanged. The first reply ends the request. Further replies are refused with queueFull when
-  // the client does not receive them. Any thread; never waits.
+  // the client does not take them. Any thread; never waits.
   ReplyResult reply(Message&& message);
   // Sends replies in order, as reply() does, and stops at the first that is not sent. Those whose
-  // client is gone are skipped and counted. A client that sleeps is woken once at most for the
-  // replies to it that follow one another. Replies that were counted are empty then; the others are
-  // unchanged.
-  // Any thread; never waits.
+  // client is gone are skipped and counted. A sleeping client is woken at most once for consecutive
+  // replies to it. Replies that were counted are empty afterwards; the others are unchanged. Any
+  // thread; never waits.
   RepliedMany replyMany(std::span<Message> replies) noexcept;
-  // Sends each of `values` as a reply to `request`, in order, until one is not sent: for a server
-  // that sends many numbers to a subscriber. Faster than a message for each of them.
+  // Sends each of `values` as a reply to `request`, in order, until one is not sent. Use it to send
+  // many numbers to a subscriber: it is faster than a message for each of them.
   //
   //   server.replyMany<mpf::Int32>(subscriber, readings);  // std::vector<mpf::Int32> readings
   //
-  // The first reply ends the request, as with reply(). A client that sleeps is woken once for up to
+  // The first reply ends the request, as with reply(). A sleeping client is woken once for up to
   // 1024 values. Any thread; never waits.
   //   request  stays with the caller, who can reply to it again
   //   values   with ServerOptions::stampsReplies, up to 1024 consecutive ones share a time stamp
@@ -214,8 +213,8 @@ class MessageServer {
     return result;
   }
 
-  // Sets the handler that run() and handleOne() call for requests of type T. A handler may set
-  // another in its own place. If there is no memory for a reply, the request ends as `refused`.
+  // Sets the handler that run() and handleOne() call for requests of type T. A handler may call
+  // on() to replace itself. If there is no memory for a reply, the request ends as `refused`.
   // What a handler gets depends on its parameter:
   //
   //   T&               the fields of one request, which is then sent as the reply
@@ -223,9 +222,9 @@ class MessageServer {
   //   MessageOf<T>&&   the same; the handler owns the request and replies to it, now or later
   //   std::span<T>     the fields of up to 16 waiting requests of one client, scalars. They are
   //                    sent as the replies, in order, after the handler has returned. A request
-  //                    comes alone if it has a deadline, or T is neither Int32 nor OutOfBand. More
-  //                    requests a second than with T& while both sides poll, fewer with
-  //                    WaitMode::block
+  //                    comes alone if it has a deadline, or T is neither Int32 nor OutOfBand. While
+  //                    both sides poll, this handles more requests per second than T&; with
+  //                    WaitMode::block, fewer
   template <MessageBody T, class Handler>
   void on(Handler handler) {
     setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {

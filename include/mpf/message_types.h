@@ -53,11 +53,11 @@ enum class MessageType : std::uint16_t {
   user = 10,
 };
 
-// The status of a ConnectMessage (manual, "ConnectMessage"). Old clients treat every value other
-// than connectYes as a disconnect.
+// The status of a ConnectMessage (manual, "ConnectMessage"). Clients of the original MPF treat
+// every value other than connectYes as a disconnect.
 enum class ConnectStatus : std::int32_t {
   // Disconnected, after a connectYes. All requests have ended before, each with its reply or fate.
-  // The client connects again by itself.
+  // The client reconnects automatically.
   connectNo = 0,
   connectYes = 1,  // connected: messages reach the server
   // A queue was full and refused a message, here or on the host of the server. The client stays
@@ -70,19 +70,19 @@ enum class ConnectStatus : std::int32_t {
 inline constexpr std::array<std::string_view, 4> kConnectStatusNames{
     "connectNo", "connectYes", "connectQueueFull", "connectRefused"};
 
-// How a request without a reply ended. Each request that was sent ends in one reply or in one fate.
-// Only after neverTaken and expired is it certain that the server has done nothing, so that the
-// request can be repeated.
+// How a request without a reply ended. "Taken" means: removed from the queue by the server. Each
+// request that was sent ends in one reply or in one fate. Only after neverTaken and expired is it
+// certain that the server has done nothing, so that the request can be repeated.
 enum class Fate : std::int32_t {
   // The server did not accept it (full queue, size, type), or destroyed it without a reply, for
   // example because its handler threw an exception.
   refused = 0,
-  neverTaken = 1,  // the connection ended before the server received it: nothing was done
-  // The server received it, or may have received it, and no reply followed: the connection ended,
-  // the timeout of SyncClient::call() passed, or the client had no memory to receive the reply. It
-  // may have been done.
+  neverTaken = 1,  // the connection ended before the server took it: nothing was done
+  // The server took it, or may have taken it, and no reply followed: the connection ended, the
+  // timeout of SyncClient::call() passed, or the client had no memory to receive the reply. It may
+  // have been done.
   outcomeUnknown = 2,
-  expired = 3,  // its deadline passed before the server received it: nothing was done
+  expired = 3,  // its deadline passed before the server took it: nothing was done
   // The client called cancel(); the server may still act on it. A late reply is dropped.
   cancelled = 4,
 };

@@ -9,7 +9,7 @@
 //   reply     status = serialServerStatus..., value = bytes that were read, extra = serialFault...
 //
 // When a server exits, it replies to the request in progress with serialServerStatusError. Requests
-// that it has not received end as `neverTaken`, and none of their bytes were sent.
+// that it has not taken end as `neverTaken`, and none of their bytes were sent.
 // <mpf/serial_sniff.h> describes how to listen to the line.
 //
 // Source   manual, "serialServer". The numbers are those of this project: no public source gives
@@ -23,6 +23,7 @@ namespace mpf::serial {
 // NOLINTBEGIN(readability-identifier-naming): names of the manual
 
 // `cmd` of a request: one command, OR-ed with any options.
+
 // Reads until the end of message, `extra` bytes, a full buffer or the timeout.
 inline constexpr std::int32_t cmdRead = 1;
 // Writes `value`.
@@ -32,7 +33,9 @@ inline constexpr std::int32_t cmdWriteRead = cmdRead | cmdWrite;
 // The bits of the command; the others are options.
 inline constexpr std::int32_t cmdCommandMask = 0xf;
 
-// Options. First drops all bytes that were received before.
+// Options.
+
+// First drops all bytes that were received before.
 inline constexpr std::int32_t cmdFlush = 0x10;
 // Starts and stops the storing of bytes that are received while no request reads, for all clients.
 inline constexpr std::int32_t cmdStartCircularBuffer = 0x20;
@@ -44,6 +47,7 @@ inline constexpr std::int32_t cmdTimeoutMilliseconds = 0x100;
 
 // `status` of a reply. With any status, `value` has all bytes that were read, including the end of
 // message.
+
 inline constexpr std::int32_t serialServerStatusOK = 0;
 inline constexpr std::int32_t serialServerStatusTimeout = 1;
 // The answer is longer than the buffer, or the buffer of the UART overflowed.
@@ -55,6 +59,7 @@ inline constexpr std::int32_t serialServerStatusError = 3;
 // statuses `extra` is that of the request. A fault that the line has while no request reads is
 // reported with the answer whose bytes are damaged or missing. If the faults alone decide on the
 // status, serialFaultOverrun makes it Overflow and any other fault makes it Error.
+
 // Bytes are missing: the UART or its driver was not read in time.
 inline constexpr std::int32_t serialFaultOverrun = 1;
 // A byte had a parity error; the byte is not in the answer.

@@ -68,7 +68,7 @@ class SyncClient {
 
   // Waits for the connection if necessary, sends `message` and waits for its first reply. `timeout`
   // limits all three together. After it, the answer is a refusal if the request was not sent, else
-  // a fate: `expired` when the server had not received the request, `outcomeUnknown` when it had.
+  // a fate: `expired` when the server had not taken the request, `outcomeUnknown` when it had.
   //   message   unchanged when it was not sent
   //   retry     as MessageClient::send(): with neverTaken, the request goes to the next server of
   //             the name, until `timeout`

@@ -226,13 +226,13 @@ message: the request. It can be sent again; a loaned array is empty then.
 timeout: [s] for the connection, the request and the reply together; None: that of the client.
 reply: the class of the reply, mpf.Message for any; by default that of the request, and Int32 for a
     SerialConfig.
-retry: if the server ends before it has received the request, send it to the next server of this
-    name. No request is executed twice by it.
+retry: if the server ends before it has taken the request, send it to the next server with this
+    name. This never executes a request twice.
 check: raise StatusError if the status of the reply is not 0, and UnexpectedReply if it is of
     another class. False: return any reply.
 
 Raises NotConnected, QueueFull or TooLarge if the request was not sent; NeverTaken or Expired if the
-server has not received it; TimedOut, OutcomeUnknown or Refused otherwise.)";
+server has not taken it; TimedOut, OutcomeUnknown or Refused otherwise.)";
 
 void addRequest(nb::module_& module) {
   nb::class_<PyRequest>(module, "Request", "A request that was sent: Client.send() returns it.")

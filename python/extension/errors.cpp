@@ -48,15 +48,16 @@ Ending endingOf(Fate fate) {
       return {"Refused", "the server refused the request"};
     case Fate::neverTaken:
       return {"NeverTaken",
-              "the connection ended before the server received the request: nothing was done"};
+              "the connection ended before the server took the request: nothing was done"};
     case Fate::expired:
-      return {"Expired", "the server did not receive the request in time: nothing was done"};
+      return {"Expired", "the server did not take the request in time: nothing was done"};
     case Fate::cancelled:
       return {"Cancelled", "the request was cancelled"};
     default:
-      return {"OutcomeUnknown",
-              "the connection ended after the server had received the request: it may have been "
-              "done"};
+      return {
+          "OutcomeUnknown",
+          "the connection ended without a reply: the server may have taken the request, and may "
+          "have carried it out"};
   }
 }
 
@@ -96,7 +97,7 @@ void raiseFate(const std::string& server, Fate fate) {
 
 void raiseTimedOut(const std::string& server) {
   raise("TimedOut", sentence(server,
-                             "no reply in time: the server received the request, and may "
+                             "no reply in time: the server took the request, and may "
                              "have acted on it"));
 }
 

@@ -16,7 +16,7 @@ namespace nb = nanobind;
 [[noreturn]] void raiseNotSent(const std::string& server, SendResult result,
                                const std::string& details);
 [[noreturn]] void raiseFate(const std::string& server, Fate fate);
-// The deadline of the caller passed after the server had received the request.
+// The deadline of the caller passed after the server had taken the request.
 [[noreturn]] void raiseTimedOut(const std::string& server);
 [[noreturn]] void raiseClosed(const char* object);
 // After fork(), in the child.

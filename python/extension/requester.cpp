@@ -133,7 +133,7 @@ void Requester::waitForEnd(Exchange& exchange, Deadline deadline,
     exchange.fate = deadline.hasPassed() && !isClosed_ ? Fate::outcomeUnknown : Fate::cancelled;
 }
 
-// Delivers `expired` if the server has not received the request.
+// Delivers `expired` if the server has not taken the request.
 void Requester::lookOnceMore(std::unique_lock<std::mutex>& lock, const Exchange& exchange) {
   struct Turn {
     explicit Turn(Requester& of) : self(of) { ++self.lastLooks_; }

@@ -203,8 +203,8 @@ void addServer(nb::module_& module) {
       .def("reply", &PyServer::reply, "request"_a, "message"_a,
            "Sends `message` to the client of `request`. The first reply ends the request; any "
            "number may follow. Any thread; never waits.\n\n"
-           "Returns False when the client has gone. Raises QueueFull when the client does not "
-           "receive further replies, and TooLarge.")
+           "Returns False when the client has gone. Raises QueueFull when the client does not take "
+           "further replies, and TooLarge.")
       .def("refuse", &PyServer::refuse, "request"_a,
            "Ends the request without a reply: its client gets Refused.")
       .def("loan", &PyServer::loan, "request"_a, "type"_a, "length"_a,

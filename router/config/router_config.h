@@ -67,9 +67,9 @@ struct Allow {
 };
 
 struct Limits {
-  // Messages of one connection that may wait to be sent (`queueSize` of the old MPF).
+  // Messages of one connection that may wait to be sent (`queueSize` of the original MPF).
   std::uint32_t queueSize = 256;
-  // Size up to which waiting messages share a frame (`bufSize` of the old MPF).
+  // Size up to which waiting messages share a frame (`bufSize` of the original MPF).
   std::uint32_t bufferBytes = 1u << 20;
   std::uint64_t maxMessageBytes = std::uint64_t{64} << 20;
   // Flow-control window: bytes of replies that one client has not taken yet.

@@ -23,7 +23,7 @@ struct ServerArguments {
   // Adds the options to `app`, which fills this object when it parses and must not outlive it. An
   // invalid value causes a CLI::ValidationError that names the valid values.
   void addTo(CLI::App& app);
-  // Adds the optional argument `queuesize`, as the old commands had it.
+  // Adds the optional argument `queuesize`, as the startup commands of the original MPF had it.
   void addQueueSizeTo(CLI::App& app);
 };
 

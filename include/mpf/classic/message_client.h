@@ -14,7 +14,7 @@
 // Threads  any thread may bind and send. Callbacks run one at a time on a thread of MPF, the same
 //          one for all clients of the process; they may call send() and delete the client.
 // Crash    when the server goes away, its requests come back, then a ConnectMessage that is not
-//          connectYes comes. The client connects again by itself.
+//          connectYes comes. The client reconnects automatically.
 // Trust    as mpf::MessageClient.
 // Throws   nothing: a failure is printed to stderr and is a status.
 // Source   manual, "Message Client". <mpf/message_client.h> has the client of new programs.

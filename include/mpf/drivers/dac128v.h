@@ -16,8 +16,8 @@
 // Threads  any number of callers at a time; a write and its read-back are one step.
 // Crash    the outputs keep their values.
 // Trust    values that the module returns are only compared. The upper four bits of a register may
-//          be anything. The ID PROM is read again when a register reads as all ones, as code 4095
-//          may, or has changed by itself.
+//          be anything. The ID PROM is read again when a register reads as all ones (which code
+//          4095 may also do) or has changed unexpectedly.
 // Source   Systran DAC128V: one 16-bit word for each channel from offset 0 of the I/O space,
 //          readable and writable.
 #pragma once

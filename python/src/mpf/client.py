@@ -121,13 +121,13 @@ class Client(_mpf.BaseClient):
         further: int = 0,
     ) -> list[Request]:
         """Sends requests in order, until one cannot be sent, and returns those that were sent. A
-        server that sleeps is woken once at most for all of them.
+        sleeping server is woken at most once.
 
         The list is shorter than `messages` if for example the queue of the server is full: send the
         rest again. If not even the first request was sent, this raises the reason, as send() does.
-        Messages that were not sent are unchanged, loaned arrays too.
+        Messages that were not sent, including loaned arrays, are unchanged.
 
-        The arguments are those of send(), for each request. None is sent again by itself.
+        The arguments are those of send(), for each request. No request is resent automatically.
         """
         return self._send_many(list(messages), timeout, reply=reply, further=further)
 

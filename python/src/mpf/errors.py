@@ -36,7 +36,7 @@ class NotConnected(NotSent, ConnectionError):
 
 
 class QueueFull(NotSent):
-    """The server has not received earlier requests, or too many of them have no reply."""
+    """The server has not taken earlier requests, or too many of them have no reply."""
 
 
 class TooLarge(NotSent):
@@ -57,23 +57,23 @@ class Refused(NoReply):
 
 
 class NeverTaken(NoReply):
-    """The connection ended before the server received the request: nothing was done."""
+    """The connection ended before the server took the request: nothing was done."""
 
     fate = "neverTaken"
 
 
 class OutcomeUnknown(NoReply):
-    """The server received the request, or may have received it, and no reply followed."""
+    """The server took the request, or may have taken it, and no reply followed."""
 
     fate = "outcomeUnknown"
 
 
 class TimedOut(OutcomeUnknown, TimeoutError):
-    """The server received the request and did not reply in time. It may still act on it."""
+    """The server took the request and did not reply in time. It may still act on it."""
 
 
 class Expired(NoReply, TimeoutError):
-    """The server did not receive the request in time: nothing was done."""
+    """The server did not take the request in time: nothing was done."""
 
     fate = "expired"
 

@@ -236,7 +236,7 @@ def mpf_signal_rw(
 
     The options of all signals:
 
-    location: of the server; by default that of the backplane.
+    location: of the server; by default MPF_LOCATION, or 0.
     subscribe: the request whose replies each have the value. Without it, an observed signal is read
         every `poll` seconds. When the server cannot be reached, or refuses, observers get the last
         reading with the alarm severity -1.
@@ -321,7 +321,7 @@ class _Converter(Generic[SignalDatatypeT]):
         found = Int32 if self._choices else _VALUES.get(datatype)
         if found is None:
             known = ", ".join(getattr(one, "__name__", str(one)) for one in _VALUES)
-            raise TypeError(f"no message has a value of type {datatype}; there are {known}")
+            raise TypeError(f"no message has a value of type {datatype}; use one of {known}")
         self._type = found
 
     def value(self, reply: Message) -> Any:

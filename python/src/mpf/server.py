@@ -14,8 +14,9 @@ What a handler returns is the reply:
     a message                 as it is
     a number, array or text   the request with this value, and status 0
     None                      the request itself, with the fields that the handler has changed
-    a generator               what it yields, one reply each; it waits while the client does not
-                              receive them, and a function keeps the server from other requests
+    a generator               each value that it yields is sent as one reply. It waits while the
+                              client does not take them; a plain (not asynchronous) generator then
+                              blocks the server's other requests
 
 An exception becomes a reply with its text and a status: -1, or that of a StatusError. The client
 gets it as a StatusError; a client in C++ gets a Char8Array.
@@ -106,7 +107,8 @@ class Server(_mpf.BaseServer):
 
     def on(self, type: type[M]) -> Callable[[H], H]:
         """Makes a function or a coroutine function the handler of requests of this class.
-        `mpf.Message`: of requests without a handler of their own, which are refused otherwise."""
+        With `mpf.Message`, the function handles all requests that have no other handler; without
+        one they are refused."""
 
         _check_class(type)
 
@@ -312,7 +314,7 @@ class Server(_mpf.BaseServer):
             self.refuse(request)
 
     def _try_reply(self, request: Message, value: object) -> bool:
-        """Returns False while the client does not receive the earlier replies."""
+        """Returns False while the client does not take the earlier replies."""
         if self._is_interrupted or self._closesAtEnd:
             raise _NoMoreReplies
         try:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf-gpib-server: a server for the instruments of a GPIB bus. The old commands were
+// mpf-gpib-server: a server for the instruments of a GPIB bus. The startup commands
+// of the original MPF were
 // initGpibServer("serverName","moduleName",bufferSize,queueSize), and before it
 // initGpibGsTi9914("moduleName","carrierName","carrierSite",intVec).
 #include <cstdio>

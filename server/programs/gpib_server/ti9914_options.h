@@ -39,7 +39,7 @@ struct Ti9914Options {
   [[nodiscard]] const Ti9914Start* find(const std::string& module) const;
 };
 
-// Opens `start`, one of options.modules. On a carrier of models, each module has a bus of its own
+// Opens `start`, one of options.modules. On a model carrier, each module has a bus of its own
 // with all meters. With --wait it waits for the module, and returns null when SIGINT or SIGTERM
 // arrived meanwhile.
 //   log      outlives the controller, which logs faults of its interrupts

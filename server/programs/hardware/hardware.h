@@ -61,8 +61,8 @@ class Hardware {
   // Adds the options; `app` must not outlive this.
   void addTo(CLI::App& app);
   // Returns the module at `place`. Creates its carrier before if necessary; plugs the module in
-  // before if the carrier is one of models. With --wait it waits for both, and logs the reason
-  // whenever it changes. Returns null when SIGINT or SIGTERM arrived while it waited.
+  // before on a model carrier. With --wait it waits for both, and logs the reason whenever it
+  // changes. Returns null when SIGINT or SIGTERM arrived while it waited.
   //   throws  what wires(), createCarrier() and IndustryPackModules::create() throw;
   //           std::invalid_argument when no option defines the carrier
   [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind,

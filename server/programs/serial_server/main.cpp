@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf-serial-server: a server for each of several serial lines. The old commands were
+// mpf-serial-server: a server for each of several serial lines. The startup commands of the
+// original MPF were
 // initSerialServer("serverName","portName",bufSize,queueSize,"eomstr",circularBufferMode), and for
 // ports of an octal UART before it
 // initOctalUART("moduleName","carrierName","carrierSite",nports,intVec) and

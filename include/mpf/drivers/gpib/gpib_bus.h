@@ -41,7 +41,7 @@
 namespace mpf {
 
 struct GpibBusOptions {
-  // How often a controller that does not report service requests by itself is asked, while there is
+  // How often a controller that does not report service requests is asked for them, while there is
   // an SRQ handler.
   std::chrono::milliseconds pollServiceRequestEvery{50};
 };

@@ -12,9 +12,9 @@
 // Threads  GpibBus calls the operations one at a time, from any thread. The handlers may be called
 //          by any thread of the controller, one at a time.
 // Crash    nothing here survives the process.
-// Trust    gpib_types.h. No operation lasts longer than its deadline and a millisecond, except
-//          where the kernel's driver of the controller makes it wait longer, which the class then
-//          says.
+// Trust    gpib_types.h. No operation lasts longer than its deadline and a millisecond, unless
+//          the kernel driver of the controller waits longer; the header of such a controller says
+//          so.
 #pragma once
 
 #include <cstdint>
@@ -65,8 +65,8 @@ class GpibController {
 
   // Calls `handler` soon after the SRQ line has become active. Empty: removes the handler, which
   // does not run after return.
-  //   returns  whether the controller reports service requests by itself; when it does not, GpibBus
-  //            asks requestsService() periodically
+  //   returns  whether the controller reports service requests; when it does not, GpibBus calls
+  //            requestsService() periodically
   virtual bool onServiceRequest(std::function<void()> handler) = 0;
   // Shows the bytes of the bus to `handler`; empty: removes it. To be called between operations. A
   // controller that sees no commands (Prologix, USBTMC) shows the data only.

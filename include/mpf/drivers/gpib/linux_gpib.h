@@ -7,10 +7,10 @@
 // on a host without such a board. The board must be configured (gpib_config) and be the system
 // controller. Its own address is read when it is opened, and is taken to be 0 while it is absent.
 //
-// libgpib knows only the timeouts 1, 3, 10, 30 ms ... 1000 s: a write, commands, or a poll that the
-// bus does not accept end at the next of these times after their deadline. A read is divided into
-// such times, and ends at its deadline. With endOfString, a byte that is the end of the string and
-// has END counts as without END, because libgpib does not tell them apart.
+// libgpib supports only the timeouts 1, 3, 10, 30 ms ... 1000 s: a write, a command or a poll that
+// the bus does not accept ends at the first of these times after its deadline. A read is divided
+// into such times, and ends at its deadline. With endOfString, a byte that is the end of the string
+// and has END counts as without END, because libgpib does not tell them apart.
 //
 // Service requests are not reported; requestsService() looks at the SRQ line, and cannot tell where
 // the board has no monitor of its lines.

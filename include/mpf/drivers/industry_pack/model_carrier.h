@@ -72,7 +72,7 @@ class ModelCarrier final : public IndustryPackCarrier {
   //   throws  as above; std::out_of_range for another line
   void setFault(const std::string& siteName, ModelFault fault, int line);
 
-  [[nodiscard]] std::string description() const override { return "a carrier of models"; }
+  [[nodiscard]] std::string description() const override { return "a model carrier"; }
   [[nodiscard]] std::size_t siteCount() const noexcept override { return sites_.size(); }
   // Valid as long as the carrier.
   //   throws  std::out_of_range unless number < siteCount()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// PeekTaps: the listeners ("taps") of a serial port. Each tap sees every byte that the port sends
-// or receives, and does not disturb the requests (manual, "setSniffHandler"; a port can have any
-// number of taps).
+// PeekTaps: the listeners ("taps") of the bytes of a serial port. (`mpf tap`, which shows messages,
+// is something else.) Each tap sees every byte that the port sends or receives, and does not
+// disturb the requests (manual, "setSniffHandler"; a port can have any number of taps).
 //
 //   const auto tap = port->attachTap([](std::span<const PeekedByte> bytes) { print(bytes); });
 //   ...                                  // the handler runs until `tap` is destroyed

@@ -16,7 +16,7 @@
 //           device opened, connected
 //   unplugged ──────────────────────► plugged      each request, and config(), fails at once while
 //             ◄──────────────────────              the port is unplugged; the port reopens the line
-//           device or connection lost              by itself
+//           device or connection lost              automatically
 //
 // Threads  any number of callers at a time, but one request at a time: a second request fails at
 //          once. release(), config(), taps, counters() and state() may be called during a request.
