@@ -50,8 +50,10 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   if (command != app.get_name() || subcommands.empty())
     return refuseArguments(command, error.what());
   if (const auto words = app.remaining(); !words.empty()) {
-    printError("{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n",
-               command, words.front(), subcommands, command);
+    printError(
+        "{}: unknown subcommand or option \"{}\"; the subcommands are {}; `{} --help` shows what "
+        "they do\n",
+        command, words.front(), subcommands, command);
   } else {
     printError("{}", app.help());
   }

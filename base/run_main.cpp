@@ -34,7 +34,7 @@ const char* placeOf(const std::exception& error) noexcept {
 
 }  // namespace
 
-int runMain(std::string_view program, const std::function<int()>& work) noexcept {
+int runMain(const std::string& program, const std::function<int()>& work) noexcept {
   openStandardDescriptors();
   try {
     return flushOutput(program, work());

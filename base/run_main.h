@@ -13,7 +13,7 @@
 #pragma once
 
 #include <functional>
-#include <string_view>
+#include <string>
 
 namespace mpf {
 
@@ -23,6 +23,7 @@ inline constexpr int kExitUsage = 2;  // usage error: wrong arguments, or an inv
 
 // Returns the exit status: the result of `work`; kExitUsage if `work` throws std::invalid_argument;
 // kExitFailed if it throws another exception, or if its output to stdout cannot be written.
-[[nodiscard]] int runMain(std::string_view program, const std::function<int()>& work) noexcept;
+//   program  begins the messages; `work` may add the subcommand to it
+[[nodiscard]] int runMain(const std::string& program, const std::function<int()>& work) noexcept;
 
 }  // namespace mpf

@@ -2,6 +2,7 @@
 // mpf-crate: runs and supervises the processes of a crate file. `mpf run`, `mpf ps` and others
 // execute it.
 #include <CLI/CLI.hpp>
+#include <string>
 
 #include "base/command_line.h"
 #include "base/run_main.h"
@@ -16,7 +17,8 @@ constexpr const char* kFooter =
     "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error, or errors in the "
     "crate file.";
 
-int runSubcommand(int argc, char** argv) {
+// Sets `program` to the name with which messages begin.
+int runSubcommand(int argc, char** argv, std::string& program) {
   // `mpf run` executes `mpf-crate run`: help and errors show what the user has typed.
   const auto isSubcommand = argc > 1 && argv[1][0] != '-';
   CLI::App app("mpf-crate - runs and supervises the processes of a crate file",
@@ -32,6 +34,7 @@ int runSubcommand(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(kFooter);
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
+  program = app.get_name() + " " + app.get_subcommands().front()->get_name();
   mpf::tools::fitToTerminal();
   return run();
 }
@@ -39,5 +42,6 @@ int runSubcommand(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return mpf::runMain("mpf-crate", [&] { return runSubcommand(argc, argv); });
+  std::string program = "mpf-crate";
+  return mpf::runMain(program, [&] { return runSubcommand(argc, argv, program); });
 }

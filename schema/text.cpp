@@ -255,7 +255,7 @@ std::optional<Message> parseAs(std::span<const std::string> words, std::string& 
   };
   for (const std::string_view word : words) {
     const auto equals = word.find('=');
-    if (equals == word.npos) return fail("'" + std::string(word) + "' is not field=value");
+    if (equals == word.npos) return fail("\"" + std::string(word) + "\" is not field=value");
     const auto name = word.substr(0, equals);
     const auto text = word.substr(equals + 1);
     auto expected = tryParseField(body, T::fields(), name, text);
@@ -267,10 +267,10 @@ std::optional<Message> parseAs(std::span<const std::string> words, std::string& 
       }
     }
     if (!expected)
-      return fail("no field '" + std::string(name) + "'; there are " + fieldNames<T>());
+      return fail("unknown field \"" + std::string(name) + "\"; use one of " + fieldNames<T>());
     if (!expected->empty())
-      return fail("field '" + std::string(name) + "' is " + *expected + ", not '" +
-                  std::string(text) + "'");
+      return fail("field \"" + std::string(name) + "\" is " + *expected + ", not \"" +
+                  std::string(text) + "\"");
   }
   auto message = built<T>(body, elements);
   message.setClientType(marks.clientType);

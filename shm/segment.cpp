@@ -70,7 +70,7 @@ FileDescriptor openRegular(const std::string& name, int flags, std::size_t& file
   struct stat status{};
   checkCall(::fstat(file.get(), &status), "read the status of", path);
   if (!S_ISREG(status.st_mode))
-    throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", path));
+    throw SegmentError(fmt::format("{}: not a segment of MPF (not a regular file)", path));
   fileBytes = static_cast<std::size_t>(status.st_size);
   return file;
 }
@@ -260,10 +260,15 @@ bool exists(const std::string& name) { return ::access(path(name).c_str(), F_OK)
 void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind,
            const std::string& path) {
   if (header.magic != layout::kMagic)
-    throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path));
+    throw SegmentError(fmt::format("{}: not a segment of MPF (wrong magic number)", path));
   if (header.layoutMajor < layout::kOldestMajor || header.layoutMajor > layout::kMajor) {
-    throw VersionError(fmt::format("{}: layout {}, this program speaks {}-{}", path,
-                                   header.layoutMajor, layout::kOldestMajor, layout::kMajor));
+    const auto supported = layout::kOldestMajor == layout::kMajor
+                               ? fmt::to_string(layout::kMajor)
+                               : fmt::format("{} to {}", layout::kOldestMajor, layout::kMajor);
+    throw VersionError(
+        fmt::format("{}: layout version {}; this program supports {}; restart all processes of the "
+                    "backplane with the same release of MPF",
+                    path, header.layoutMajor, supported));
   }
   if (header.kind != kind) {
     throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path,

@@ -57,7 +57,8 @@ Finding judgeWindow(const std::string& name, layout::SegmentKind kind,
   if (window->isLocked)
     return {Verdict::dead,
             fmt::format("{} has ended; another process holds a lock on {}", owner, name)};
-  return {Verdict::dead, fmt::format("no process holds the lock of {}; {} did", name, owner)};
+  return {Verdict::dead,
+          fmt::format("no process holds the lock of {}; its owner was {}", name, owner)};
 } catch (const VersionError& error) {
   return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
 } catch (const SegmentError& error) {

@@ -32,8 +32,15 @@ std::optional<Segment> openConflicting(const std::string& name, layout::SegmentK
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 } catch (const SegmentError& error) {
   if (segments::probeOwner(name) == segments::Owner::alive)
-    throw NameInUse(fmt::format("in use by another program: {}", error.what()));
+    throw NameInUse(
+        fmt::format("another program uses a file that is not a usable segment: {}", error.what()));
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
+}
+
+// The text in `field` of a header, up to the first null character.
+template <std::size_t length>
+std::string_view textOf(const std::array<char, length>& field) {
+  return {field.data(), ::strnlen(field.data(), length)};
 }
 
 // Returns if the conflicting window of a name has disappeared or is about to be removed. Otherwise
@@ -47,11 +54,11 @@ void checkConflict(const std::string& name, layout::SegmentKind kind, Deadline r
     case segments::Owner::absent:
       return;
     case segments::Owner::alive:
-      throw NameInUse(
-          fmt::format("{}: in use by {} (pid {})", segments::path(name),
-                      std::string(header.program.data(),
-                                  ::strnlen(header.program.data(), header.program.size())),
-                      header.ownerPid));
+      throw NameInUse(fmt::format(
+          "server \"{}\" at location {} is already running: {}, pid {} ({}); stop it, or "
+          "use another name, location or backplane",
+          textOf(header.name), header.location, textOf(header.program), header.ownerPid,
+          segments::path(name)));
     case segments::Owner::dead:
       if (segments::removeIfOwnerless(name)) return;
       if (!reaperIsLate.hasPassed() &&

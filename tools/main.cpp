@@ -2,6 +2,7 @@
 // mpf: runs servers, shows backplanes, servers and clients, and exchanges messages with them from
 // the shell.
 #include <CLI/CLI.hpp>
+#include <string>
 
 #include "base/command_line.h"
 #include "base/run_main.h"
@@ -16,7 +17,8 @@ constexpr const char* kFooter =
     "Environment: MPF_BACKPLANE, MPF_LOCATION, MPF_CRATES.\n"
     "Exit status: 0 success; 1 failure, the text on stderr says why; 2 usage error.";
 
-int runSubcommand(int argc, char** argv) {
+// Appends the chosen subcommand to `program`.
+int runSubcommand(int argc, char** argv, std::string& program) {
   CLI::App app(
       "mpf - runs servers, shows backplanes, servers and clients, and exchanges messages with them "
       "from the shell",
@@ -40,6 +42,7 @@ int runSubcommand(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(kFooter);
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
+  program += " " + app.get_subcommands().front()->get_name();
   mpf::tools::fitToTerminal();
   return run();
 }
@@ -47,5 +50,6 @@ int runSubcommand(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return mpf::runMain("mpf", [&] { return runSubcommand(argc, argv); });
+  std::string program = "mpf";
+  return mpf::runMain(program, [&] { return runSubcommand(argc, argv, program); });
 }

@@ -34,7 +34,7 @@ void addProgram(CLI::App& app, Run& run, const std::string& name, const std::str
 void addCrate(CLI::App& app, Run& run) {
   for (const auto& [name, purpose] : std::vector<std::pair<const char*, const char*>>{
            {"run", "Starts the servers, routers and IOCs of a crate, and supervises them"},
-           {"new", "Writes a crate file with comments, which runs on device models"},
+           {"new", "Writes a new crate file, or the JSON schema of crate files"},
            {"convert", "Converts a startup file of the original MPF to a crate file"},
            {"ps", "Lists the processes of crates, with their states and restarts"},
            {"logs", "Shows what a process of a crate has printed"},

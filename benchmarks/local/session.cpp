@@ -97,8 +97,9 @@ int show(const std::vector<Result>& results, const Machine& machine, const Place
 }  // namespace
 
 void addOptions(CLI::App& app, Options& options) {
-  app.add_flag("--quick", options.quick,
-               "Shorter and noisier measurements: at most 40 s, local 90 s");
+  app.add_flag(
+      "--quick", options.quick,
+      "Measure for a shorter time, with more noise: 90 s (local) or 40 s (others) at most");
   app.add_flag("--list", options.list, "Only list the rows that would be measured");
   app.add_option(
       "--json", options.jsonFile,
@@ -114,13 +115,13 @@ void addOptions(CLI::App& app, Options& options) {
 }
 
 void addWaitOption(CLI::App& app, Mode& wait) {
-  const std::map<std::string, Mode> modes{
+  static const std::map<std::string, Mode> modes{
       {"adaptive", Mode::adaptive}, {"block", Mode::block}, {"spin", Mode::spin}};
-  app.add_option("--wait", wait,
-                 "How MPF servers and clients wait: adaptive (default), block, or spin (not for "
-                 "hardware)")
-      ->transform(CLI::Transformer(modes))
-      ->type_name("MODE");
+  app.add_option_function<std::string>(
+         "--wait", [&wait](const std::string& name) { wait = modes.at(name); },
+         "How MPF servers and clients wait: spin is not for hardware")
+      ->check(CLI::IsMember({"adaptive", "block", "spin"}))
+      ->default_str("adaptive");
 }
 
 std::vector<Measurement> choose(std::vector<Measurement> all, const Options& options) {

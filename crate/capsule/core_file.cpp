@@ -58,7 +58,9 @@ Tree look(const DeadProcess& process) {
   const auto core = findCore(pattern, process.pid);
   if (core.empty())
     return problem(
-        fmt::format("no core of the process among {}; is its limit 0 (ulimit -c)?", pattern));
+        fmt::format("found no core of the process in {}; if its core size limit is 0, raise it "
+                    "(ulimit -c unlimited)",
+                    pattern));
   Tree tree{{"file", core}};
   tree.update(readCore(core));
   return tree;

@@ -33,7 +33,8 @@ void writeFile(const std::filesystem::path& path, const std::string& text) {
 int convert(const ConvertArguments& arguments) try {
   const auto& source = arguments.source;
   if (!source.isStartupFile())
-    throw ConfigError(fmt::format("{} is a crate file already", source.file()));
+    throw std::invalid_argument(
+        fmt::format("{} is a crate file; use a startup file of the original MPF", source.file()));
   // The name of the crate decides the names of the files.
   const auto name = source.readStartup("ioc.cmd", true).crate.name;
   const auto iocFile = name + "-ioc.cmd";
@@ -60,12 +61,15 @@ void addConvert(CLI::App& app, Run& run) {
       *app.add_subcommand("convert", "Converts a startup file of the original MPF to a crate file");
   auto arguments = std::make_shared<ConvertArguments>();
   arguments->source.addOptions(command);
+  command.get_option("file")->description("Startup file of the original MPF");
+  command.get_option("--name")->description(
+      "Name of the crate; default: the folder of the startup file");
   command.add_option("--output", arguments->folder, "Folder for the files")
       ->capture_default_str()
       ->type_name("FOLDER");
   command.footer(
-      "Carriers without --carrier become models: Linux hosts cannot reach the buses of boards of "
-      "2001.\nLines that are skipped are listed with the reason.");
+      "Carriers without --carrier become model carriers, because MPF cannot access VME and ISA "
+      "boards.\nLines that are skipped are listed with the reason.");
   command.callback([arguments, &run] { run = [arguments] { return convert(*arguments); }; });
 }
 

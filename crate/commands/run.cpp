@@ -151,8 +151,9 @@ void addRun(CLI::App& app, Run& run) {
 
 void addNew(CLI::App& app, Run& run) {
   auto& command =
-      *app.add_subcommand("new", "Writes a crate file with comments, which runs on device models");
-  auto& kind = *command.add_subcommand("crate", "Writes NAME.toml");
+      *app.add_subcommand("new", "Writes a new crate file, or the JSON schema of crate files");
+  auto& kind =
+      *command.add_subcommand("crate", "Writes NAME.toml with comments; it runs on device models");
   auto& schema =
       *command.add_subcommand("schema", "Prints a JSON schema of crate files, for editors");
   schema.callback([&run] {

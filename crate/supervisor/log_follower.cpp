@@ -46,7 +46,7 @@ std::string LineFolder::fold(const std::string& line) {
 
 std::string LineFolder::finish() {
   if (folded_ == 0) return {};
-  auto text = fmt::format("(the line before came {} more times)\n", folded_);
+  auto text = fmt::format("(previous line repeated {} times)\n", folded_);
   folded_ = 0;
   return text;
 }

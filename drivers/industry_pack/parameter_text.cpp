@@ -52,11 +52,11 @@ bool ParameterText::trySkip(char character) noexcept {
 
 void ParameterText::expect(char character, std::string_view after) {
   if (!trySkip(character))
-    refuse(fmt::format("no '{}' after the {}, but \"{}\"", character, after, rest_));
+    refuse(fmt::format("expected '{}' after the {}, found \"{}\"", character, after, rest_));
 }
 
 void ParameterText::expectEnd() {
-  if (!atEnd()) refuse(fmt::format("\"{}\" at the end has no meaning", rest_));
+  if (!atEnd()) refuse(fmt::format("unexpected \"{}\" at the end", rest_));
 }
 
 bool ParameterText::trySkipBeforeNumber(char separator) noexcept {

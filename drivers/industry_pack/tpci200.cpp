@@ -46,7 +46,7 @@ Tpci200Options Tpci200Options::parse(const std::string& parameters) {
     refuse(fmt::format("\"{}\" is not a PCI address", options.board));
   if (comma == std::string::npos) return options;
   const auto rest = parameters.substr(comma + 1);
-  if (!rest.starts_with(kPoll)) refuse(fmt::format("\"{}\" has no meaning", rest));
+  if (!rest.starts_with(kPoll)) refuse(fmt::format("unknown parameter \"{}\"", rest));
   const auto microseconds = tryNumber<long>(std::string_view(rest).substr(kPoll.size()));
   if (!microseconds || *microseconds < 1 || *microseconds > 1'000'000)
     refuse(fmt::format("\"{}\": use 1 to 1000000 microseconds", rest));

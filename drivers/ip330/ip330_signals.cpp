@@ -50,7 +50,10 @@ Ip330Signal parseSignal(const std::string& text,
   if (kind == "dc") return parseDc(parameters);
   if (kind == "sine") return parseSine(parameters);
   if (const auto other = others.find(kind); other != others.end()) return other->second(parameters);
-  throw std::invalid_argument(fmt::format("unknown kind of signal \"{}\"; use dc or sine", kind));
+  std::string kinds = "dc, sine";
+  for (const auto& [other, make] : others) kinds += ", " + other;
+  throw std::invalid_argument(
+      fmt::format("unknown kind of signal \"{}\"; use one of {}", kind, kinds));
 }
 
 int parseChannel(const std::string& text) {

@@ -153,7 +153,7 @@ LinkOptions LinkOptions::parse(std::string_view text, const Defaults& defaults) 
       throw std::invalid_argument(fmt::format("\"{}\": use <key>=<value>", pair));
     const auto& key = keyNamed(pair.substr(0, equals), defaults.mode == Mode::write);
     if (std::ranges::find(seen, &key) != seen.end())
-      throw std::invalid_argument(fmt::format("{}: use the key once", key.name));
+      throw std::invalid_argument(fmt::format("{} appears twice; write it once", key.name));
     seen.push_back(&key);
     key.set(options, key.name, pair.substr(equals + 1));
   }

@@ -104,7 +104,8 @@ TEST_F(CommandLine, NamesTheSubcommandInItsMessages) {
             "mpf-y one: --count: 11 is out of range: use 1 to 10; `mpf-y one --help` shows how to "
             "use it\n");
   EXPECT_EQ(parse(app, {"three"}).err,
-            "mpf-y: no subcommand or option \"three\"; there are one, two; `mpf-y --help` shows "
+            "mpf-y: unknown subcommand or option \"three\"; the subcommands are one, two; `mpf-y "
+            "--help` shows "
             "what they do\n");
   const auto nothing = parse(app, {});
   EXPECT_EQ(nothing.status, 2);

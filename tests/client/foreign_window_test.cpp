@@ -92,15 +92,15 @@ TEST_P(ForeignWindow, IsReportedToAServerOfTheSameName) {
 }
 
 const Foreign kForeigners[] = {
-    {"NewerLayout", "layout 9, this program speaks 1-1",
+    {"NewerLayout", "layout version 9; this program supports 1; restart",
      [](const std::string& path) {
        writeWindow(path, [](layout::SegmentHeader& header) { header.layoutMajor = 9; });
      }},
-    {"OlderLayout", "layout 0, this program speaks 1-1",
+    {"OlderLayout", "layout version 0; this program supports 1; restart",
      [](const std::string& path) {
        writeWindow(path, [](layout::SegmentHeader& header) { header.layoutMajor = 0; });
      }},
-    {"ForeignMagic", "foreign magic",
+    {"ForeignMagic", "wrong magic number",
      [](const std::string& path) {
        writeWindow(path, [](layout::SegmentHeader& header) { header.magic = 0x1234; });
      }},

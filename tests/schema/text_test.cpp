@@ -112,22 +112,26 @@ TEST(Text, SetsTheEndOfMessageLengthFromItsString) {
 }
 
 TEST(Text, NamesTheInvalidFieldAndTheValidOnes) {
-  EXPECT_EQ(refusal(MessageType::int32, {"adress=3"}),
-            "int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, "
-            "clientType, clientExtra");
-  EXPECT_EQ(refusal(MessageType::serialConfig, {"value=3"}),
-            "serialConfig: no field 'value'; there are baud, stopBits, bitsPerChar, parity, "
-            "flowControl, clientType, clientExtra");
-  EXPECT_EQ(refusal(MessageType::int32, {"value"}), "int32: 'value' is not field=value");
-  EXPECT_EQ(refusal(MessageType::int32, {"value=2147483648"}),
-            "int32: field 'value' is an integer from -2147483648 to 2147483647, not '2147483648'");
+  EXPECT_EQ(
+      refusal(MessageType::int32, {"adress=3"}),
+      "int32: unknown field \"adress\"; use one of timeout, cmd, status, address, extra, value, "
+      "clientType, clientExtra");
+  EXPECT_EQ(
+      refusal(MessageType::serialConfig, {"value=3"}),
+      "serialConfig: unknown field \"value\"; use one of baud, stopBits, bitsPerChar, parity, "
+      "flowControl, clientType, clientExtra");
+  EXPECT_EQ(refusal(MessageType::int32, {"value"}), "int32: \"value\" is not field=value");
+  EXPECT_EQ(
+      refusal(MessageType::int32, {"value=2147483648"}),
+      "int32: field \"value\" is an integer from -2147483648 to 2147483647, not \"2147483648\"");
   EXPECT_EQ(refusal(MessageType::serialConfig, {"parity=EO"}),
-            "serialConfig: field 'parity' is one character, or 0, not 'EO'");
+            "serialConfig: field \"parity\" is one character, or 0, not \"EO\"");
   EXPECT_EQ(refusal(MessageType::connect, {"status=yes"}),
-            "connect: field 'status' is one of connectNo connectYes connectQueueFull "
-            "connectRefused, not 'yes'");
-  EXPECT_EQ(refusal(MessageType::char8Array, {"eomString=12345"}),
-            "char8Array: field 'eomString' is a C-escaped string of at most 4 bytes, not '12345'");
+            "connect: field \"status\" is one of connectNo connectYes connectQueueFull "
+            "connectRefused, not \"yes\"");
+  EXPECT_EQ(
+      refusal(MessageType::char8Array, {"eomString=12345"}),
+      "char8Array: field \"eomString\" is a C-escaped string of at most 4 bytes, not \"12345\"");
   EXPECT_EQ(refusal(MessageType{77}, {}), "type 77 is unknown");
 }
 

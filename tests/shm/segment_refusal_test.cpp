@@ -54,10 +54,11 @@ TEST_F(SegmentRefusal, NamesASegmentOfTheOtherByteOrder) {
 
 TEST_F(SegmentRefusal, NamesBothVersions) {
   header().layoutMajor = 3;
-  EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("layout 3, this program speaks 1-1")));
+  EXPECT_THAT(refusal(),
+              AllOf(HasSubstr(path_), HasSubstr("layout version 3; this program supports 1;")));
 
   header().layoutMajor = 0;
-  EXPECT_THAT(refusal(), HasSubstr("layout 0, this program speaks"));
+  EXPECT_THAT(refusal(), HasSubstr("layout version 0; this program supports"));
 }
 
 TEST_F(SegmentRefusal, AcceptsANewerMinorVersion) {

@@ -158,7 +158,8 @@ TEST_F(StaleSegmentsTest, DoesNotJudgeUnknownFiles) {
     segments::remove(file);
   }
   EXPECT_EQ(all.at(notes).reason, "not a name that MPF gives");
-  EXPECT_THAT(all.at(serverName("newer")).reason, HasSubstr("layout 2, this program speaks 1-1"));
+  EXPECT_THAT(all.at(serverName("newer")).reason,
+              HasSubstr("layout version 2; this program supports 1;"));
 }
 
 // A successor gets the name after the file was judged dead. The removal checks the lock again.

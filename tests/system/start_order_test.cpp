@@ -85,8 +85,10 @@ TEST_F(StartOrderTest, ASecondServerOfANameIsToldWhichProcessServesIt) {
 
   auto second = startServer();
 
-  EXPECT_EQ(second.line(), fmt::format("error: {}: in use by mpf_test_victim (pid {})",
-                                       windowPath(), first.pid()));
+  EXPECT_EQ(second.line(),
+            fmt::format("error: server \"echo\" at location 0 is already running: mpf_test_victim, "
+                        "pid {} ({}); stop it, or use another name, location or backplane",
+                        first.pid(), windowPath()));
   const auto status = second.wait();
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1);
   auto client = startClient();
@@ -134,7 +136,8 @@ TEST_F(StartOrderTest, OneOfManyServersThatStartAtOnceServes) {
   for (auto& server : servers) {
     const auto line = server.line();
     open += line == "open" ? 1 : 0;
-    refused += line.starts_with("error: " + windowPath() + ": in use by ") ? 1 : 0;
+    refused +=
+        line.starts_with("error: server \"echo\" at location 0 is already running: ") ? 1 : 0;
   }
 
   EXPECT_EQ(open, 1);

@@ -63,7 +63,8 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsAnErrorThatListsAll) {
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"unknown\"; there are run, new, convert, ps, logs, "
+            "mpf: unknown subcommand or option \"unknown\"; the subcommands are run, new, convert, "
+            "ps, logs, "
             "capsule, stop, start, restart, reload, ls, mrr, msr, top, inspect, "
             "call, sniff, gpib-sniff, tap, replay, clean, doctor, torture, "
             "bench; "
@@ -126,10 +127,11 @@ TEST_F(CommandLineTest, RefusesInvalidNames) {
     const auto ended = run({name, "--backplane", "a.b"});
     EXPECT_EQ(ended.status, 2);
     EXPECT_EQ(ended.err,
-              "mpf: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
+              "mpf " + name +
+                  ": backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
   }
   EXPECT_EQ(runTool({"call", "echo", "int32"}, "a/b").err,
-            "mpf: backplane name \"a/b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
+            "mpf call: backplane name \"a/b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
 
   const auto ended = run({"call", std::string(64, 'x'), "int32"});
 

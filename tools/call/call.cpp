@@ -61,16 +61,14 @@ std::string meaning(Fate fate, MessageType type) {
   switch (fate) {
     case Fate::refused:
       return fmt::format(
-          "the server does not accept {} messages, or released this one without a "
-          "reply",
+          "the server does not accept {} messages, or dropped this one without a reply",
           toString(type));
     case Fate::neverTaken:
-      return "the server ended before it received the request: nothing was done";
+      return "the server ended before it took the request: nothing was done";
     case Fate::outcomeUnknown:
-      return "the server received the request, but did not reply in time, ended, or sent a reply "
-             "larger than the limit of a router: the request may have been carried out";
+      return "no reply arrived; the server may have taken the request and carried it out";
     case Fate::expired:
-      return "the server did not receive the request in time: nothing was done";
+      return "the server did not take the request in time: nothing was done";
     case Fate::cancelled:
       return "the client cancelled the request";
   }
@@ -240,9 +238,9 @@ void addCall(CLI::App& app, Run& run) {
   command.add_option("--count", arguments->count, "Messages to send, each after a reply")
       ->capture_default_str()
       ->check(wholeNumber(1, std::uint64_t{1} << 53));
-  addSeconds(command, "--interval", arguments->interval, "Pause between them", true);
-  addSeconds(command, "--follow", arguments->follow,
-             "Time to print further messages that the server sends after the reply", true);
+  addTime(command, "--interval", arguments->interval, "Pause between them");
+  addTime(command, "--follow", arguments->follow,
+          "Time to print further messages that the server sends after the reply");
   command.add_flag("--print", arguments->printAll,
                    "With --count: print each reply; print arrays in full");
   addJson(command, arguments->json);

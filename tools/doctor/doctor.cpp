@@ -49,7 +49,8 @@ int examine(bool asJson) {
 
 void addDoctor(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "doctor", "Finds settings of this host that make MPF fail or slow it, and names the remedy");
+      "doctor",
+      "Finds settings of this host with which MPF fails or runs slowly, and prints remedies");
   auto json = std::make_shared<bool>(false);
   addJson(command, *json);
   command.footer("Exit status: 0 no problem (there may be warnings); 1 at least one problem.");

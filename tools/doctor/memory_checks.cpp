@@ -205,11 +205,12 @@ Finding checkNamespaces(const Host& host) {
             Health::ok,
             fmt::format("{} windows, all of processes of this namespace", windows),
             {}};
-  return {kName, Health::warning,
-          fmt::format("{} of {} windows belong to processes of another namespace: their death is "
-                      "noticed up to 0.1 s later, and reports cannot show whether they are stopped",
-                      foreign, windows),
-          "run all in one pid namespace; containers: --pid=host, or --pid=container:NAME"};
+  return {
+      kName, Health::warning,
+      fmt::format("{} of {} windows belong to processes of another namespace: their death is "
+                  "detected up to 0.1 s later, and reports cannot show whether they are stopped",
+                  foreign, windows),
+      "run all in one pid namespace; containers: --pid=host, or --pid=container:NAME"};
 }
 
 Finding checkRemoveIpc(const Host& host) {

@@ -35,7 +35,7 @@ Finding checkHidepid(const Host& host) {
   if (hidepid == mount->options.end() || hidepid->second == "0" || hidepid->second == "off")
     return {kName, Health::ok, "shows the processes of all users", {}};
   return {kName, Health::warning,
-          fmt::format("hidepid={}: the death of another user's process is noticed up to 0.1 s "
+          fmt::format("hidepid={}: the death of another user's process is detected up to 0.1 s "
                       "later, and reports cannot show whether it is stopped",
                       hidepid->second),
           "mount -o remount,hidepid=0 /proc, or gid=GROUP with the group of the users of MPF"};
@@ -48,7 +48,7 @@ Finding checkPidfd(const Host& host) {
   return {
       kName, Health::warning,
       fmt::format("kernel {} has no pidfd_open, or a sandbox forbids it: the death of a process is "
-                  "noticed up to 0.1 s later",
+                  "detected up to 0.1 s later",
                   kernel),
       "use kernel 5.3 or newer; containers: a seccomp profile that allows pidfd_open"};
 }

@@ -56,12 +56,12 @@ int keyOf(int code) {
 Screen::Screen() {
   if (::isatty(STDIN_FILENO) == 0 || ::isatty(STDOUT_FILENO) == 0) {
     throw std::runtime_error(
-        "top: stdin or stdout is not a terminal; `mpf top --batch 1` prints the tables once");
+        "stdin or stdout is not a terminal; `mpf top --batch 1` prints the tables once");
   }
   std::setlocale(LC_CTYPE, "");
   if (newterm(nullptr, stdout, stdin) == nullptr) {
     throw std::runtime_error(
-        "top: the type of this terminal ($TERM) is unknown; `mpf top --batch 1` prints the tables "
+        "the type of this terminal ($TERM) is unknown; `mpf top --batch 1` prints the tables "
         "once");
   }
   cbreak();

@@ -33,8 +33,8 @@ void addGpibSniff(CLI::App& app, Run& run) {
   addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
   auto* const decode = command.add_flag(
       "--decode", arguments->decode,
-      "Names of commands (UNL, LAG 22, TAG 5), data and EOI, with times; otherwise as in the "
-      "manual of MPF: _ is UNT, ? is UNL");
+      "Names of commands (UNL, LAG 22, TAG 5), data and EOI, with times; otherwise as the "
+      "original MPF printed them: _ is UNT, ? is UNL");
   addJson(command, arguments->json);
   command.get_option("--json")->excludes(decode);
   command.callback([arguments, &run] {

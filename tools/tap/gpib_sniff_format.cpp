@@ -144,7 +144,7 @@ std::unique_ptr<GpibSniffFormat> GpibSniffFormat::make(const std::string& name,
   if (name == "decode") return std::make_unique<DecodedLines>(realtimeOffsetNs);
   if (name == "json") return std::make_unique<JsonObjects>();
   throw std::invalid_argument(
-      fmt::format("no sniff format \"{}\"; there are manual, decode and json", name));
+      fmt::format("unknown sniff format \"{}\"; use manual, decode or json", name));
 }
 
 }  // namespace mpf::tools

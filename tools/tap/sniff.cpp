@@ -28,8 +28,8 @@ void addSniff(CLI::App& app, Run& run) {
   addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
   command
       .add_option("--format", arguments->format,
-                  "lines: one direction in a line, with times; manual: ten bytes in a line, as in "
-                  "the manual of MPF")
+                  "lines: one direction in a line, with times; manual: ten bytes in a line, as the "
+                  "original MPF printed them")
       ->capture_default_str()
       ->check(CLI::IsMember({"lines", "manual"}));
   addJson(command, arguments->json);

@@ -95,7 +95,7 @@ std::unique_ptr<SniffFormat> SniffFormat::make(const std::string& name,
   if (name == "manual") return std::make_unique<Manual>();
   if (name == "json") return std::make_unique<Json>();
   throw std::invalid_argument(
-      fmt::format("no sniff format \"{}\"; there are lines, manual and json", name));
+      fmt::format("unknown sniff format \"{}\"; use lines, manual or json", name));
 }
 
 }  // namespace mpf::tools

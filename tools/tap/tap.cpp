@@ -39,8 +39,8 @@ std::string parseLink(const std::string& digits) {
   const auto number = tryNumber<std::uint64_t>(digits, 16);
   if (number && hex(*number).size() >= kFewestDigits) return hex(*number);
   throw std::invalid_argument(
-      fmt::format("tap: \"{}\" is not a link: use its hexadecimal number, or at least {} of its "
-                  "first digits, as tap and inspect show it",
+      fmt::format("\"{}\" is not a link: use its hexadecimal number, or at least its first {} "
+                  "digits, as tap and inspect show it",
                   digits, kFewestDigits));
 }
 
@@ -101,7 +101,7 @@ void addTap(CLI::App& app, Run& run) {
       ->capture_default_str()
       ->check(wholeNumber(0));
   command.add_option("--link", arguments->link,
-                     "Only this link: its hexadecimal number, or at least 6 of its first digits");
+                     "Only this link: its hexadecimal number, or at least its first 6 digits");
   command
       .add_option("--write", arguments->file,
                   "Write to this file, for `mpf replay`, instead of to stdout")

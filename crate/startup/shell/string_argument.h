@@ -26,8 +26,8 @@ namespace mpf::startup {
   if (value.is(Value::Kind::undefined))
     throw LineError{column, fmt::format("undefined symbol {}: assign a string to it before {}",
                                         value.name(), command.name)};
-  throw LineError{column, fmt::format("{}: a string is expected instead of {}", command.name,
-                                      value.description())};
+  throw LineError{
+      column, fmt::format("{}: expected a string, found {}", command.name, value.description())};
 }
 
 }  // namespace mpf::startup

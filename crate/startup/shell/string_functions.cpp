@@ -19,7 +19,7 @@ using Limits = StartupShell::Limits;
 
 [[noreturn]] void refuse(const Command& command, std::size_t index, const std::string& expected) {
   throw LineError{columnOf(command, index),
-                  fmt::format("{}: {} is expected instead of {}", command.name, expected,
+                  fmt::format("{}: expected {}, found {}", command.name, expected,
                               command.argument(index).description())};
 }
 

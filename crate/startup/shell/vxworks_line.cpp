@@ -54,7 +54,7 @@ void VxWorksLine::failAtToken(const std::string& expected) {
   if (token.kind == TokenKind::end) found = "the end of the line";
   else if (token.kind == TokenKind::string) found = '"' + token.text + '"';
   else if (token.kind != TokenKind::name && token.kind != TokenKind::symbol) found = "a number";
-  throw LineError{token.column, fmt::format("{} is expected instead of {}", expected, found)};
+  throw LineError{token.column, fmt::format("expected {}, found {}", expected, found)};
 }
 
 void VxWorksLine::expect(std::string_view symbol) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf-dac128v-server: a server for one DAC128V. The old command was
-// initDAC128V("module","carrier","site",queueSize).
+// mpf-dac128v-server: a server for one DAC128V. The startup command of the original MPF
+// was initDAC128V("module","carrier","site",queueSize).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fmt/format.h>
@@ -40,7 +40,8 @@ struct Options {
     hardware.addTo(app);
     arguments.addTo(app);
     app.footer(
-        "The old command: initDAC128V(\"module\", \"carrier\", \"site\", queuesize)\n"
+        "Startup command of the original MPF: initDAC128V(\"module\", \"carrier\", \"site\", "
+        "queuesize)\n"
         "The outputs of a model drive the wires MODULE.0 to MODULE.7, in volts.\n"
         "Example: mpf-dac128v-server dac ipac IP_a 20 --carrier ipac=model");
     return mpf::parseCommandLine(app, argc, argv);

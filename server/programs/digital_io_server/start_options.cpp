@@ -47,7 +47,8 @@ std::optional<int> DigitalIoStartOptions::parse(int argc, char** argv, Hardware&
   inputs.addTo(app, kHighestBit);
   arguments.addTo(app);
   app.footer(
-      "The old command: initIpUnidig(\"module\", \"carrier\", \"site\", queuesize, mspoll, intvec, "
+      "Startup command of the original MPF: initIpUnidig(\"module\", \"carrier\", \"site\", "
+      "queuesize, mspoll, intvec, "
       "risingmask, fallingmask, bimask, "
       "maxclients)\n"
       "The outputs of a model drive the wires MODULE.0, MODULE.1, ..., with 0 or 5 volts.\n"

@@ -45,7 +45,7 @@ std::optional<int> GpibStartOptions::parse(int argc, char** argv) {
   app.get_option("--wait")->description("Start even if the controller is missing, and wait for it");
   arguments.addTo(app);
   app.footer(
-      "The old commands:\n"
+      "Startup commands of the original MPF:\n"
       "  initGpibGsTi9914(\"module\", \"carrier\", \"site\", intVec)\n"
       "  initGpibServer(\"server\", \"module\", bufsize, queuesize)\n"
       "Examples:\n"

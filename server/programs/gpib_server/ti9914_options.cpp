@@ -62,11 +62,10 @@ void Ti9914Options::addTo(CLI::App& app) {
   addWords(app, "--ti9914", "MODULE,CARRIER,SITE[,VECTOR]",
            "A GPIB controller on an Industry Pack module, GreenSpring IP-488",
            [this](OptionFields& words) { modules.push_back(readModule(words)); });
-  addWords(
-      app, "--meter", "ADDRESS[,WIRE]",
-      "On a carrier of models: a voltmeter like the HP 3458A, which measures a wire of --wires; "
-      "default: one at 22, with simulated values",
-      [this](OptionFields& words) { meters.push_back(readMeter(words)); });
+  addWords(app, "--meter", "ADDRESS[,WIRE]",
+           "On a model carrier: a voltmeter like the HP 3458A, which measures a wire of --wires; "
+           "default: one at 22, with simulated values",
+           [this](OptionFields& words) { meters.push_back(readMeter(words)); });
 }
 
 const Ti9914Start* Ti9914Options::find(const std::string& module) const {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf-ip330-server: all servers of one Acromag IP330. --help shows the old commands.
+// mpf-ip330-server: all servers of one Acromag IP330. --help shows the startup commands of the
+// original MPF.
 #include <cstdio>
 #include <fmt/format.h>
 #include <map>
@@ -27,11 +28,10 @@ std::unique_ptr<mpf::Ip330Model> makeAdc(const mpf::Ip330StartOptions& options,
                              .noise = 0.5});
   if (options.signals.empty()) return model;
   std::map<std::string, mpf::Ip330SignalKind> kinds;
-  if (wires != nullptr) {
-    kinds["wire"] = [wires](const std::string& name) -> mpf::Ip330Signal {
-      return [wire = wires->wire(name)](double) { return wire.get(); };
-    };
-  }
+  kinds["wire"] = [wires](const std::string& name) -> mpf::Ip330Signal {
+    if (wires == nullptr) throw std::invalid_argument("a wire needs --wires FILE");
+    return [wire = wires->wire(name)](double) { return wire.get(); };
+  };
   for (auto& [channel, signal] : mpf::parseIp330Signals(options.signals, kinds))
     model->setSignal(channel, signal);
   return model;

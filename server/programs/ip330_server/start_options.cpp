@@ -21,10 +21,10 @@ int notNegative(const OptionFields& words, const char* what, int value) {
   return value;
 }
 
-constexpr const char* kOldCommands =
+constexpr const char* kFooter =
     "Without --scan, --config, --sweep and --pid it serves scans as MODULE and configuration as "
     "MODULEConfig.\n"
-    "The old commands, whose arguments are in the same order here:\n"
+    "Startup commands of the original MPF, with their arguments in the same order as here:\n"
     "  initIp330(\"module\", \"carrier\", \"site\", \"type\", \"range\", first, last, maxclients, "
     "vector)\n"
     "  configIp330(ip330, scanMode, \"trigger\", usPerScan, secondsBetweenCalibrate)\n"
@@ -38,8 +38,8 @@ constexpr const char* kOldCommands =
     "vector, queuesize).\n"
     "DIP switches 1 to 10: -5to5 1011000010, -10to10 0100110010, 0to5 1010100100, 0to10 "
     "1011001000\n"
-    "Gain 3 of 0to5 is calibrated with 0 V: where a converter gives code 0 for it (offset below "
-    "0), that gain has status -1.\n"
+    "With range 0to5, gain 3 is calibrated with 0 V. If the converter has a negative offset, this "
+    "is impossible, and requests with gain 3 get status -1.\n"
     "Example: mpf-ip330-server adc ipac IP_a D -5to5 0 15 10 120 --carrier ipac=model --signal "
     "0=sine:5:2";
 
@@ -147,7 +147,7 @@ std::optional<int> Ip330StartOptions::parse(int argc, char** argv, Hardware& har
   addServers(app);
   hardware.addTo(app);
   arguments.addTo(app);
-  app.footer(kOldCommands);
+  app.footer(kFooter);
   if (const auto status = parseCommandLine(app, argc, argv)) return status;
   try {
     takeAll();

@@ -51,12 +51,12 @@ void OctalOptions::addTo(CLI::App& app) {
          [this](const std::string& kind) {
            model.model = kind == "232" ? 0x22 : kind == "422" ? 0x2a : 0x48;
          },
-         "On a carrier of models: the kind of the module")
+         "On a model carrier: the kind of the module")
       ->check(CLI::IsMember({"232", "422", "485"}))
       ->default_str("232");
   app.add_flag_callback(
       "--octal-timing", [this] { model.time = OctalUartModelTime::clock; },
-      "On a carrier of models: bytes take as long as on a real line, and may get lost");
+      "On a model carrier: bytes take as long as on a real line, and may get lost");
 }
 
 const OctalPortStart* OctalOptions::find(const std::string& port) const {

@@ -134,7 +134,7 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
       "Start even if the line or its board is missing, and wait for it");
   arguments.addTo(app);
   app.footer(
-      "The old commands:\n"
+      "Startup commands of the original MPF:\n"
       "  initSerialServer(\"server\", \"port\", bufsize, queuesize, \"eomstr\", circular)\n"
       "  initOctalUART(\"module\", \"carrier\", \"site\", nports, intVec)\n"
       "  initOctalUARTPort(\"port\", \"module\", n, baud, \"parity\", stopbits, bits, \"flow\")\n"

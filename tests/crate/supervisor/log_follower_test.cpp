@@ -26,7 +26,7 @@ TEST(LineFolder, CountsLinesThatRepeat) {
 
   EXPECT_EQ(text,
             "12:00:00 full\n12:00:01 full\n12:00:02 full\n"
-            "(the line before came 7 more times)\nempty\n");
+            "(previous line repeated 7 times)\nempty\n");
   EXPECT_EQ(folder.finish(), "");
 }
 

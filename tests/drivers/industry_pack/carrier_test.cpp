@@ -36,7 +36,7 @@ TEST(CarriersTest, ThatDoNotExistAreNamedWithTheExistingOnes) {
               ThrowsMessage<std::invalid_argument>("no carrier \"three\"; carriers: one, two"));
   EXPECT_THAT([&] { static_cast<void>(carriers.site("one", "IP_e")); },
               ThrowsMessage<std::invalid_argument>(
-                  AllOf(HasSubstr("carrier \"one\" (a carrier of models) has no site \"IP_e\""),
+                  AllOf(HasSubstr("carrier \"one\" (a model carrier) has no site \"IP_e\""),
                         HasSubstr("it has IP_a to IP_d"))));
   EXPECT_THROW(static_cast<void>(carriers.site("three", "IP_a")), std::invalid_argument);
 }
@@ -48,7 +48,7 @@ TEST(CarriersTest, NeedANameThatIsNotInUse) {
   EXPECT_THROW(carriers.add("", std::make_unique<ModelCarrier>()), std::invalid_argument);
   EXPECT_THAT([&] { carriers.add("ipac", std::make_unique<ModelCarrier>()); },
               ThrowsMessage<std::invalid_argument>(
-                  HasSubstr("carrier \"ipac\" exists already: a carrier of models")));
+                  HasSubstr("carrier \"ipac\" exists already: a model carrier")));
 
   EXPECT_EQ(&carriers.find("ipac"), &first);
 }

@@ -39,9 +39,9 @@ TEST(Mvme162ParametersTest, GiveTheAddressesOfTheSites) {
 constexpr BadParameters kBadMvme162[]{
     {"ipmv162", "A:l=8", IndustryPackStatus::badIntLevel, "interrupt level 8: use 1 to 7, or 0"},
     {"ipmv162", "A:l=3,9", IndustryPackStatus::badIntLevel, "second interrupt level 9"},
-    {"ipmv162", "A:l", IndustryPackStatus::badAddress, "no '=' after the l"},
+    {"ipmv162", "A:l", IndustryPackStatus::badAddress, "expected '=' after the l"},
     {"ipmv162", "A:m=0xe0000000", IndustryPackStatus::badAddress,
-     "no ',' after the memory address"},
+     "expected ',' after the memory address"},
     {"ipmv162", "A:m=0xe0001000,64", IndustryPackStatus::badAddress,
      "memory address 0xe0001000: use a multiple of 0x10000"},
     {"ipmv162", "A:m=0xe0000000,32", IndustryPackStatus::badAddress, "memory size [K] 32"},

@@ -85,11 +85,11 @@ TEST(ParameterText, NamesAMissingPart) {
   ParameterText text("Board", "1 x");
   EXPECT_EQ(text.number("slot"), 1U);
   EXPECT_STREQ(errorOf([&] { text.expect(',', "slot"); }).what(),
-               "Board \"1 x\": no ',' after the slot, but \"x\"");
+               "Board \"1 x\": expected ',' after the slot, found \"x\"");
   EXPECT_STREQ(errorOf([&] { static_cast<void>(text.number("level")); }).what(),
                "Board \"1 x\": the level is not a number: \"x\"");
   EXPECT_STREQ(errorOf([&] { text.expectEnd(); }).what(),
-               "Board \"1 x\": \"x\" at the end has no meaning");
+               "Board \"1 x\": unexpected \"x\" at the end");
   ParameterText empty("Board", " ");
   EXPECT_STREQ(errorOf([&] { static_cast<void>(empty.number("slot")); }).what(),
                "Board \" \": the slot is missing");

@@ -50,7 +50,7 @@ constexpr BadParameters kBadVipc[]{
     {"vipc310", "0x6000,", IndustryPackStatus::badAddress, "the memory size [K] is missing"},
     {"vipc310", "ipac", IndustryPackStatus::badAddress,
      "the I/O address is not a number: \"ipac\""},
-    {"vipc310", "0x6000,128,3", IndustryPackStatus::badAddress, "\",3\" at the end has no meaning"},
+    {"vipc310", "0x6000,128,3", IndustryPackStatus::badAddress, "unexpected \",3\" at the end"},
     {"vipc610", "0xfe00", IndustryPackStatus::badAddress, "I/O address 0xfe00"},
     {"vipc610", "-0x6000", IndustryPackStatus::badAddress, "the I/O address is not a number"},
     {"vipc616", "0x6200", IndustryPackStatus::badAddress, "a multiple of 0x400"},

@@ -83,7 +83,7 @@ TEST(LinkOptions, ErrorsNameTheKeyAndWhatIsValid) {
            Invalid{"range=1:1", "range=1:1: use <low>:<high>, two different numbers"},
            Invalid{"range=5", "range=5: use <low>:<high>"},
            Invalid{"cmd", "\"cmd\": use <key>=<value>"},
-           Invalid{"cmd=1 cmd=2", "cmd: use the key once"},
+           Invalid{"cmd=1 cmd=2", "cmd appears twice; write it once"},
            Invalid{"adress=1",
                    "invalid key \"adress\": the keys of an input record are type, cmd, address"},
            Invalid{"rewrite=yes", "invalid key \"rewrite\": the keys of an input record are"},

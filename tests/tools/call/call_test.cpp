@@ -170,9 +170,10 @@ TEST_F(CallTest, RefusesTypesThatOnlyMpfItselfSends) {
 TEST_F(CallTest, AWrongFieldIsAnErrorThatListsAllFields) {
   const std::vector<Echoed> wrong{
       {{"int32", "adress=3"},
-       "mpf call: int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, "
+       "mpf call: int32: unknown field \"adress\"; use one of timeout, cmd, status, address, "
+       "extra, value, "
        "clientType, clientExtra\n"},
-      {{"int32", "value"}, "mpf call: int32: 'value' is not field=value\n"},
+      {{"int32", "value"}, "mpf call: int32: \"value\" is not field=value\n"},
   };
   for (const auto& [words, text] : wrong) {
     std::vector<std::string> arguments{"call", "echo"};
@@ -232,11 +233,11 @@ TEST_F(CallTest, ATypeWithoutAHandlerIsRefused) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.err,
-            "mpf call: no reply: refused (the server does not accept float64 messages, or released "
+            "mpf call: no reply: refused (the server does not accept float64 messages, or dropped "
             "this one without a reply)\n");
 }
 
-// Whether the server has received the request by then depends on the speed of the machine.
+// Whether the server has taken the request by then depends on the speed of the machine.
 TEST_F(CallTest, ARequestWithoutAReplyInTimeHasAFate) {
   serve([&](MessageServer& server) {
     server.on<Int32>([&](Int32Message&& request) { kept_.push_back(std::move(request)); });
@@ -253,10 +254,9 @@ TEST_F(CallTest, ARequestWithoutAReplyInTimeHasAFate) {
   EXPECT_THAT(
       ended.err,
       testing::AnyOf(
-          StartsWith("mpf call: no reply: outcomeUnknown (the server received the request, but did "
-                     "not reply in time"),
-          StartsWith(
-              "mpf call: no reply: expired (the server did not receive the request in time")));
+          StartsWith("mpf call: no reply: outcomeUnknown (no reply arrived; the server may have "
+                     "taken the request and carried it out)"),
+          StartsWith("mpf call: no reply: expired (the server did not take the request in time")));
 }
 
 TEST_F(CallTest, CountsTheReasonsOfFailedCalls) {

@@ -213,9 +213,9 @@ TEST_F(InspectTest, NamesMissingAndTruncatedFiles) {
       folder_ / std::filesystem::path(theLink().at("file").get<std::string>()).filename();
   std::ofstream(folder_ / "notes") << std::string(1000, 'x');
 
-  EXPECT_EQ(
-      run({"inspect", "--file", folder_ / "notes"}).err,
-      "mpf inspect: " + (folder_ / "notes").string() + ": not a segment of MPF (foreign magic)\n");
+  EXPECT_EQ(run({"inspect", "--file", folder_ / "notes"}).err,
+            "mpf inspect: " + (folder_ / "notes").string() +
+                ": not a segment of MPF (wrong magic number)\n");
   EXPECT_EQ(run({"inspect", "--file", folder_ / "none"}).err,
             "mpf inspect: " + (folder_ / "none").string() + ": the file does not exist\n");
   for (const auto bytes : {0, 100, 511, 512, 3000, 6000}) {

@@ -79,7 +79,7 @@ TEST_F(SegmentImageTest, RefusesFilesThatAreNotSegments) {
   write(std::string(511, 'x'));
   EXPECT_EQ(refusal(), path() + ": truncated, 511 bytes are too few for a header");
   write(std::string(4096, 'x'));
-  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (foreign magic)");
+  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (wrong magic number)");
 }
 
 TEST_F(SegmentImageTest, RefusesDirectoriesAndPipesWithoutWaiting) {

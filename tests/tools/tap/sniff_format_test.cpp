@@ -36,7 +36,7 @@ TEST_F(SniffFormatTest, RefusesAnUnknownFormat) {
     static_cast<void>(SniffFormat::make("hex", 0));
     FAIL() << "make() did not throw";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "no sniff format \"hex\"; there are lines, manual and json");
+    EXPECT_STREQ(error.what(), "unknown sniff format \"hex\"; use lines, manual or json");
   }
 }
 

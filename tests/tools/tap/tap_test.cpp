@@ -167,8 +167,10 @@ TEST_F(TapTest, FollowsOneChosenLink) {
   for (const auto* const word : {"x1", "9343"}) {
     const auto wrong = run({"tap", "echo", "--link", word});
     EXPECT_EQ(wrong.status, 2);
-    EXPECT_THAT(wrong.err, HasSubstr(std::string("\"") + word +
-                                     "\" is not a link: use its hexadecimal number"));
+    EXPECT_THAT(wrong.err,
+                testing::StartsWith(std::string("mpf tap: \"") + word +
+                                    "\" is not a link: use its hexadecimal number, or at least its "
+                                    "first 6 digits"));
   }
   // As inspect prints a number below 2^60.
   EXPECT_EQ(run({"tap", "echo", "0.1", "--link", "123456789abcdef"}).status, 0);
@@ -182,9 +184,9 @@ TEST_F(TapTest, FailsAtOnceWhenTheFileCannotBeWritten) {
   const auto nowhere = run({"tap", "nobody", "--write", file_ + ".none/x"});
 
   EXPECT_EQ(full.status, 1);
-  EXPECT_EQ(full.err, "mpf: write /dev/full: No space left on device\n");
+  EXPECT_EQ(full.err, "mpf tap: write /dev/full: No space left on device\n");
   EXPECT_EQ(nowhere.status, 1);
-  EXPECT_EQ(nowhere.err, "mpf: open " + file_ + ".none/x: No such file or directory\n");
+  EXPECT_EQ(nowhere.err, "mpf tap: open " + file_ + ".none/x: No such file or directory\n");
 }
 
 TEST_F(TapTest, NamesAnAbsentServer) {

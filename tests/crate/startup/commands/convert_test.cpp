@@ -59,7 +59,8 @@ TEST_F(ConvertTest, RefusesACrateFile) {
   static_cast<void>(folder_.write("lab.toml", "[[server]]\nprogram = \"int32\"\n"));
   const auto result = mpf("convert lab.toml");
   EXPECT_EQ(WEXITSTATUS(result.status), 2);
-  EXPECT_THAT(result.output, HasSubstr("lab.toml is a crate file already"));
+  EXPECT_THAT(result.output,
+              testing::StartsWith("mpf convert: lab.toml is a crate file; use a startup file"));
 }
 
 TEST_F(ConvertTest, RunChecksAStartupFile) {

@@ -17,10 +17,9 @@ TEST(StartupShellTest, ReportsAllMistakesOfAFile) {
   scene.run("f(1\r\ng(2)\r\nx = \r\nunknownCommand 1\r\n");
 
   EXPECT_EQ(scene.calls, Texts{"g(2)"});
-  EXPECT_EQ(scene.reports(),
-            (Texts{"1:4 error a comma or ) is expected instead of the end of the line",
-                   "3:5 error a value is expected instead of the end of the line",
-                   "4:1 warning unknown command unknownCommand; it is skipped"}));
+  EXPECT_EQ(scene.reports(), (Texts{"1:4 error expected a comma or ), found the end of the line",
+                                    "3:5 error expected a value, found the end of the line",
+                                    "4:1 warning unknown command unknownCommand; it is skipped"}));
 }
 
 TEST(StartupShellTest, ResultOfAnUnknownCommandIsUnavailable) {

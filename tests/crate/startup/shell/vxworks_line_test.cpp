@@ -75,14 +75,13 @@ TEST(VxWorksLineTest, OutputIsNotRedirected) {
 }
 
 TEST(VxWorksLineTest, NamesTheColumnOfAnError) {
-  EXPECT_EQ(reportsOf("f(1,2"),
-            Texts{"1:6 error a comma or ) is expected instead of the end of the "
-                  "line"});
+  EXPECT_EQ(reportsOf("f(1,2"), Texts{"1:6 error expected a comma or ), found the end of the "
+                                      "line"});
   EXPECT_EQ(reportsOf("f(\"a)"), Texts{"1:3 error the string is not closed: write \" at its end"});
   EXPECT_EQ(reportsOf("f 1 2"),
-            Texts{"1:5 error a comma or the end of the line is expected instead of a number"});
+            Texts{"1:5 error expected a comma or the end of the line, found a number"});
   EXPECT_EQ(reportsOf("x = nothing"), Texts{"1:5 error undefined symbol nothing"});
-  EXPECT_EQ(reportsOf("x = 1 +"), Texts{"1:8 error a value is expected instead of the end of the "
+  EXPECT_EQ(reportsOf("x = 1 +"), Texts{"1:8 error expected a value, found the end of the "
                                         "line"});
   EXPECT_EQ(reportsOf("f(1,,2)"), Texts{"1:5 warning an argument is missing here; it counts as 0"});
   for (const auto* line : {"f(1))", "f(1) g", "= 1", "x =", "1 = 2", "&", "f(&1)", "<", "five / 0",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// HardwareTest: a carrier of models and a backplane, for tests of servers that drive modules;
+// HardwareTest: a model carrier and a backplane, for tests of servers that drive modules;
 // HardwareAsker: a client of such a server.
 #pragma once
 

@@ -162,7 +162,9 @@ TEST_F(Ip330ProgramTest, ReportsInvalidArguments) {
            {{"--config", "a,1,2"}, "unexpected field \"2\""},
            {{"--pid", "p,0,dac,2"}, "no --dac has the name dac"},
            {{"--dac", "d,ipac,IP_b", "--pid", "p,16,d,2"}, "channel 16: the board"},
-           {{"--signal", "0=square:1"}, "unknown kind of signal \"square\""},
+           {{"--signal", "0=square:1"},
+            "unknown kind of signal \"square\"; use one of dc, sine, wire"},
+           {{"--signal", "0=wire:dac.0"}, "a wire needs --wires FILE"},
            {{"--scan", "a,0,20"}, "the board scans 0 to 15"}}) {
     std::vector<std::string> all{"adc", "ipac", "IP_a"};
     all.insert(all.end(), options.begin(), options.end());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-serial-server on ports of an octal UART: a process on a carrier of models, instruments on its
+// mpf-serial-server on ports of an octal UART: a process on a model carrier, instruments on its
 // pseudo-terminals.
 #include <fcntl.h>
 
