@@ -94,4 +94,26 @@ int refuseArguments(const std::string& program, const std::string& why) {
 CLI::Validator wholeNumber(std::uint64_t least, std::uint64_t most) { return inRange(least, most); }
 CLI::Validator number(double least, double most) { return inRange(least, most); }
 
+CLI::Option* addTime(CLI::App& app, const std::string& name, Nanoseconds present,
+                     const std::string& help, TimeRange range,
+                     const std::function<void(Nanoseconds)>& set) {
+  const auto check = [range](const std::string& text) {
+    const auto time = tryTime(text, MissingUnit::seconds);
+    if (!time)
+      return fmt::format(
+          "{} is not a time: use 200ms, 2s or 1.5min; a number without a unit is in seconds", text);
+    if (*time >= range.least && *time <= range.most) return std::string();
+    const auto least = range.least == kAboveZero.least ? "more than 0s" : timeText(range.least);
+    if (range.most == kLongestTime) return fmt::format("{} is out of range: use {}", text, least);
+    return fmt::format("{} is out of range: use {} to {}", text, least, timeText(range.most));
+  };
+  const auto take = [set](const std::string& text) {
+    set(tryTime(text, MissingUnit::seconds).value());
+  };
+  return app.add_option_function<std::string>(name, take, help)
+      ->check(CLI::Validator(check, {}))
+      ->type_name("TIME")
+      ->default_str(timeText(present));
+}
+
 }  // namespace mpf

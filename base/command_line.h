@@ -10,12 +10,17 @@
 // Threads  one thread.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
+#include "base/time_text.h"
+
 namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
 class App;
+class Option;
 class Validator;
 }  // namespace CLI
 
@@ -34,5 +39,25 @@ int refuseArguments(const std::string& program, const std::string& why);
 [[nodiscard]] CLI::Validator wholeNumber(std::uint64_t least,
                                          std::uint64_t most = ~std::uint64_t{0});
 [[nodiscard]] CLI::Validator number(double least, double most);
+
+struct TimeRange {
+  Nanoseconds least{0};
+  Nanoseconds most = kLongestTime;
+};
+inline constexpr TimeRange kAboveZero{.least = Nanoseconds(1)};
+
+// Adds an option for a time, as in "200ms", "2s", "1.5min" or "2", which means seconds. The help
+// shows the present value of `time` as the default. Fractions of the unit of `time` are rounded up.
+CLI::Option* addTime(CLI::App& app, const std::string& name, Nanoseconds present,
+                     const std::string& help, TimeRange range,
+                     const std::function<void(Nanoseconds)>& set);
+template <class Rep, class Period>
+CLI::Option* addTime(CLI::App& app, const std::string& name,
+                     std::chrono::duration<Rep, Period>& time, const std::string& help,
+                     TimeRange range = {}) {
+  using Time = std::chrono::duration<Rep, Period>;
+  return addTime(app, name, time, help, range,
+                 [&time](Nanoseconds value) { time = std::chrono::ceil<Time>(value); });
+}
 
 }  // namespace mpf

@@ -87,7 +87,7 @@ void applyOverride(WrittenConfig& to, const std::string& name, const std::string
   if (const auto text = texts.find(name); text != texts.end()) *text->second = value;
   else if (name == "mode") config.rights.mode = parseMode(value);
   else if (name == "group") config.rights.group = parseGroup(value);
-  else setLimit(config.limits, name, value);
+  else setLimit(config.limits, name, value, MissingUnit::seconds);
   const auto place = "--" + name;
   constexpr std::string_view kTls = "tls-";
   if (name.starts_with(kTls)) to.places.tls[name.substr(kTls.size())] = place;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "tools/arguments.h"
 
-#include <fmt/format.h>
-
 #include <mpf/backplane.h>
 
 namespace mpf::tools {
@@ -22,24 +20,6 @@ void addServer(CLI::App& app, ServerArguments& arguments) {
 
 void addJson(CLI::App& app, bool& json) {
   app.add_flag("--json", json, "Print JSON, for programs");
-}
-
-void addSeconds(CLI::App& app, const std::string& name, double& seconds, const std::string& text,
-                bool mayBeZero) {
-  const auto check = [mayBeZero](const std::string& word) {
-    constexpr double kMost = 1e9;
-    double value = 0;
-    const bool good = CLI::detail::lexical_cast(word, value) && value <= kMost &&
-                      (mayBeZero ? value >= 0 : value > 0);
-    return good ? std::string()
-                : fmt::format("{} is not a time: use a number of seconds {} to 1e9", word,
-                              mayBeZero ? "from 0" : "above 0");
-  };
-  app.add_option(name, seconds, text)->capture_default_str()->type_name("SECONDS")->check(check);
-}
-
-Nanoseconds ofSeconds(double seconds) {
-  return Nanoseconds(static_cast<std::int64_t>(seconds * 1e9));
 }
 
 }  // namespace mpf::tools

@@ -5,8 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include <mpf/clock.h>
-
 namespace mpf::tools {
 
 // Names the server that a subcommand uses.
@@ -20,9 +18,5 @@ void addServer(CLI::App& app, ServerArguments& arguments);
 // help text shows it.
 void addBackplane(CLI::App& app, std::string& backplane, const std::string& otherwise);
 void addJson(CLI::App& app, bool& json);
-// An option for a time in seconds; its help text shows the default. Accepts 0 if `mayBeZero`.
-void addSeconds(CLI::App& app, const std::string& name, double& seconds, const std::string& text,
-                bool mayBeZero);
-[[nodiscard]] Nanoseconds ofSeconds(double seconds);
 
 }  // namespace mpf::tools

@@ -12,7 +12,7 @@ char letter(int i) { return static_cast<char>('a' + i % 26); }
 }  // namespace
 
 int main(int argc, char** argv) {
-  mpf::EchoClient echo{"mpf-char8-array-client", "Char8Array", "Char8Array message", {}, {}};
+  mpf::EchoClient echo{"mpf-char8-array-client", "Char8Array", "Char8Array message", true, {}, {}};
   echo.make = [](int i, std::size_t bytes) {
     auto message = mpf::Char8ArrayMessage::allocValue(bytes);
     std::ranges::fill(message.value(), letter(i));

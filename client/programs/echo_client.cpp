@@ -29,7 +29,7 @@ struct EchoOptions {
   std::string backplane;
   std::int32_t location = Backplane::defaultLocation();
   int count = 1000;
-  int timeoutMs = 1000;
+  Nanoseconds timeout = std::chrono::seconds(1);
   std::size_t bytes = 100;
 };
 
@@ -71,8 +71,7 @@ int callEchoServer(const EchoOptions& options, const EchoClient& echo) {
   EchoStatistics statistics;
   for (int i = 0; i < options.count; ++i) {
     const auto sentNs = Clock::nowNs();
-    auto answer =
-        client.call(echo.make(i, options.bytes), std::chrono::milliseconds(options.timeoutMs));
+    auto answer = client.call(echo.make(i, options.bytes), options.timeout);
     if (!answer) {
       const auto why = client.client().notConnectedBecause();
       statistics.fail(
@@ -100,12 +99,11 @@ int callServer(int argc, char** argv, const EchoClient& echo) {
   app.add_option("--count", options.count, "Messages to send")
       ->capture_default_str()
       ->check(wholeNumber(1, kMost));
-  app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")
-      ->capture_default_str()
-      ->check(wholeNumber(1, kMost));
-  app.add_option("--bytes", options.bytes, "Size of the array in a Char8Array message [bytes]")
-      ->capture_default_str()
-      ->check(wholeNumber(0, kMostBytes));
+  addTime(app, "--timeout", options.timeout, "Longest wait for a reply", kAboveZero);
+  if (echo.isArray)
+    app.add_option("--bytes", options.bytes, "Size of the array in a message [bytes]")
+        ->capture_default_str()
+        ->check(wholeNumber(0, kMostBytes));
   if (const auto status = parseCommandLine(app, argc, argv)) return *status;
   return callEchoServer(options, echo);
 }

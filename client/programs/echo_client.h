@@ -15,6 +15,7 @@ struct EchoClient {
   std::string program;  // name of the program
   std::string server;   // default name of the server
   std::string what;     // what is sent, in the singular: "Int32 message"
+  bool isArray;         // whether its size is an option
   std::function<Message(int i, std::size_t bytes)> make;  // message number i
   // Whether `reply` is the echo of message number i.
   std::function<bool(int i, std::size_t bytes, const Message& reply)> isEcho;

@@ -22,7 +22,7 @@ using nlohmann::json;
 struct ControlArguments {
   std::string crate;
   std::string process;
-  double waitS = 30;
+  Nanoseconds wait = std::chrono::seconds(30);
 };
 
 json processOf(const json& report, const std::string& name) {
@@ -34,7 +34,7 @@ json processOf(const json& report, const std::string& name) {
 // Waits until the process is in one of the states in which nothing more happens.
 int waitFor(const CrateFolder& folder, const ControlArguments& arguments, bool isStop,
             int pidBefore) {
-  const auto deadline = Deadline::after(tools::ofSeconds(arguments.waitS));
+  const auto deadline = Deadline::after(arguments.wait);
   for (;;) {
     const auto process = processOf(askSupervisor(folder, {{"do", "ps"}}), arguments.process);
     const auto state = process.value("state", "gone");
@@ -48,8 +48,8 @@ int waitFor(const CrateFolder& folder, const ControlArguments& arguments, bool i
                                            arguments.process, process.value("reason", ""),
                                            arguments.process));
     if (deadline.hasPassed())
-      throw std::runtime_error(
-          fmt::format("{} is still {} after {} s", arguments.process, state, arguments.waitS));
+      throw std::runtime_error(fmt::format("{} is still {} after {}", arguments.process, state,
+                                           timeText(arguments.wait)));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }
@@ -64,13 +64,13 @@ int controlProcess(const std::string& what, const ControlArguments& arguments) {
 int stopCrate(const ControlArguments& arguments) {
   const auto folder = chooseCrate(arguments.crate);
   askSupervisor(folder, {{"do", "shutdown"}});
-  const auto deadline = Deadline::after(tools::ofSeconds(arguments.waitS));
+  const auto deadline = Deadline::after(arguments.wait);
   while (folder.isLocked()) {
     if (deadline.hasPassed())
       throw std::runtime_error(
-          fmt::format("the crate \"{}\" is still stopping after {} s; `mpf ps` "
+          fmt::format("the crate \"{}\" is still stopping after {}; `mpf ps` "
                       "shows which process",
-                      folder.name(), arguments.waitS));
+                      folder.name(), timeText(arguments.wait)));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   fmt::print("the crate \"{}\" has stopped\n", folder.name());
@@ -84,8 +84,7 @@ void addRequest(CLI::App& app, Run& run, const std::string& what, const char* he
   if (what == "stop") process->description("Name of the process; without it, the whole crate");
   else process->required();
   addCrateOption(command, arguments->crate);
-  tools::addSeconds(command, "--wait", arguments->waitS, "Longest time to wait for the result",
-                    true);
+  addTime(command, "--wait", arguments->wait, "Longest time to wait for the result");
   command.callback([arguments, what, &run] {
     run = [arguments, what] {
       return arguments->process.empty() ? stopCrate(*arguments) : controlProcess(what, *arguments);

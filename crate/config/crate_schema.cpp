@@ -11,8 +11,11 @@ using Json = nlohmann::ordered_json;
 Json text() { return {{"type", "string"}}; }
 Json integer() { return {{"type", "integer"}}; }
 Json texts() { return {{"oneOf", {text(), {{"type", "array"}, {"items", text()}}}}}; }
-Json duration() { return {{"type", "string"}, {"pattern", "^[1-9][0-9]*(ms|s|min)$"}}; }
-Json durationOrOff() { return {{"type", "string"}, {"pattern", "^([1-9][0-9]*(ms|s|min)|off)$"}}; }
+// A number above 0 with a unit, such as 1.5min.
+const std::string kDuration =
+    R"(([0-9]*[1-9][0-9]*(\.[0-9]+)?|[0-9]+\.[0-9]*[1-9][0-9]*)(ms|s|min))";
+Json duration() { return {{"type", "string"}, {"pattern", "^" + kDuration + "$"}}; }
+Json durationOrOff() { return {{"type", "string"}, {"pattern", "^(" + kDuration + "|off)$"}}; }
 Json size() { return {{"type", {"string", "integer"}}, {"pattern", "^[0-9]+(KiB|MiB|GiB)?$"}}; }
 Json variables() {
   return {{"type", "object"},

@@ -6,8 +6,10 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <map>
 
 #include "base/number.h"
+#include "base/time_text.h"
 #include "base/toml/toml_table.h"
 #include "crate/config/program_kinds.h"
 
@@ -35,11 +37,9 @@ constexpr const char* kDurationRule =
     "\"{}\": write a time with its unit, such as 500ms, 2s or 1min{}";
 
 std::optional<milliseconds> tryDuration(std::string_view text) {
-  const auto number = tryTakeNumber<std::int64_t>(text);
-  const std::map<std::string_view, std::int64_t> units{{"ms", 1}, {"s", 1000}, {"min", 60'000}};
-  const auto unit = units.find(text);
-  if (!number || unit == units.end() || *number <= 0 || *number > 10'000'000) return std::nullopt;
-  return milliseconds(*number * unit->second);
+  const auto time = tryTime(text);
+  if (!time || *time == Nanoseconds(0)) return std::nullopt;
+  return std::chrono::ceil<milliseconds>(*time);
 }
 
 // Parses "4096", "64KiB", "4MiB" or "1GiB".

@@ -22,7 +22,7 @@ void checkCrate(const Crate& crate, ConfigErrors& errors);
 // empty: nothing.
 [[nodiscard]] std::string problemOfName(const std::string& name);
 
-// Parses "500ms", "2s" or "5min".
+// Parses "500ms", "2s" or "1.5min".
 //   throws  std::invalid_argument that shows the form
 [[nodiscard]] std::chrono::milliseconds parseDuration(const std::string& text);
 // The same, or "off" (0).

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
@@ -41,8 +42,8 @@ constexpr int kMoreRounds = 100;  // further rounds after the time if something 
 
 struct Options {
   std::string backplane;
-  double seconds = 0;
-  double patience = 0.25;
+  mpf::Nanoseconds duration{0};
+  std::chrono::milliseconds patience{250};
 };
 
 std::atomic<bool> isStopped{
@@ -126,19 +127,16 @@ void print(Rounds& rounds) {
   }
 }
 
-template <class Duration>
-Duration durationOf(double seconds) {
-  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
-}
-
 int run(const Options& options) {
   const bool hasTerminal = ::isatty(STDIN_FILENO) != 0 && ::isatty(STDOUT_FILENO) != 0;
-  const auto seconds = options.seconds > 0 || hasTerminal ? options.seconds : 5;
-  const auto end = seconds > 0 ? mpf::Deadline::after(durationOf<mpf::Nanoseconds>(seconds))
-                               : mpf::Deadline::never();
+  constexpr mpf::Nanoseconds kNoLimit{0};
+  const auto duration = options.duration != kNoLimit || hasTerminal
+                            ? options.duration
+                            : mpf::Nanoseconds(std::chrono::seconds(5));
+  const auto end = duration != kNoLimit ? mpf::Deadline::after(duration) : mpf::Deadline::never();
   const mpf::StopSignals stop(
       [](void*) noexcept { isStopped.store(true, std::memory_order_relaxed); }, nullptr);
-  Rounds rounds(options.backplane, durationOf<std::chrono::milliseconds>(options.patience), end);
+  Rounds rounds(options.backplane, options.patience, end);
   (hasTerminal ? draw : print)(rounds);
   const auto& verdict = rounds.verdict();
   fmt::print(
@@ -154,11 +152,10 @@ int demo(int argc, char** argv) {
                "mpf-demo");
   app.add_option("--backplane", options.backplane,
                  "Backplane; default: $MPF_BACKPLANE, or \"default\"");
-  app.add_option("--seconds", options.seconds,
-                 "Time until the program ends [s]; default 5 without a terminal, else until q")
-      ->check(mpf::number(0.1, 1e9));
-  app.add_option("--patience", options.patience, "Longest wait for an answer [s]; default 0.25")
-      ->check(mpf::number(0.001, 1e6));
+  mpf::addTime(app, "--seconds", options.duration,
+               "Time until the program ends; 0: 5s without a terminal, else until q");
+  mpf::addTime(app, "--patience", options.patience, "Longest wait for an answer",
+               {.least = std::chrono::milliseconds(1)});
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
   return run(options);
 }

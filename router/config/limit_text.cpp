@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/number.h"
+#include "base/time_text.h"
 #include "shm/layout.h"
 
 namespace mpf::router {
@@ -16,7 +17,6 @@ struct Unit {
   const char* name;
   std::uint64_t size;
 };
-constexpr std::array<Unit, 3> kTimes{{{"min", 60'000}, {"s", 1000}, {"ms", 1}}};
 constexpr std::array<Unit, 4> kSizes{
     {{"GiB", 1u << 30}, {"MiB", 1u << 20}, {"KiB", 1u << 10}, {"", 1}}};
 constexpr std::array<Unit, 1> kCounts{{{"", 1}}};
@@ -121,21 +121,24 @@ const Limit& limitOf(const std::string& name) {
   return *limit;
 }
 
-std::uint64_t parseKind(Kind kind, const std::string& text) {
-  if (kind == Kind::time) return static_cast<std::uint64_t>(parseTime(text).count());
+std::uint64_t parseMs(const std::string& text, MissingUnit missing) {
+  const auto time = tryTime(text, missing);
+  if (!time) throw std::invalid_argument(fmt::format("\"{}\": write {}", text, kHowTime));
+  return static_cast<std::uint64_t>(std::chrono::ceil<std::chrono::milliseconds>(*time).count());
+}
+
+std::uint64_t parseKind(Kind kind, const std::string& text, MissingUnit missing) {
+  if (kind == Kind::time) return parseMs(text, missing);
   return kind == Kind::size ? parseBytes(text) : parseUnits(text, kCounts, kHowCount);
 }
 
 std::string kindText(Kind kind, std::uint64_t number) {
-  if (kind == Kind::time) return unitsText(number, kTimes);
+  if (kind == Kind::time) return timeText(std::chrono::milliseconds(number));
   return kind == Kind::size ? unitsText(number, kSizes) : fmt::format("{}", number);
 }
 
 }  // namespace
 
-std::chrono::milliseconds parseTime(const std::string& text) {
-  return std::chrono::milliseconds(parseUnits(text, kTimes, kHowTime));
-}
 std::uint64_t parseBytes(const std::string& text) { return parseUnits(text, kSizes, kHowSize); }
 
 const std::vector<std::string>& limitNames() {
@@ -156,9 +159,10 @@ std::string limitType(const std::string& name) {
   return kind == Kind::size ? "SIZE" : "NUMBER";
 }
 
-void setLimit(Limits& limits, const std::string& name, const std::string& text) {
+void setLimit(Limits& limits, const std::string& name, const std::string& text,
+              MissingUnit missing) {
   const auto& limit = limitOf(name);
-  const auto value = parseKind(limit.kind, text);
+  const auto value = parseKind(limit.kind, text, missing);
   if (value < limit.least || value > limit.most) {
     throw std::invalid_argument(fmt::format("{} is out of range: use {} to {}", text,
                                             kindText(limit.kind, limit.least),

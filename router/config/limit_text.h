@@ -8,13 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "base/time_text.h"
 #include "router/config/router_config.h"
 
 namespace mpf::router {
-
-// Parses "500ms", "2s" or "1min". The unit is required.
-//   throws  std::invalid_argument that shows the form
-[[nodiscard]] std::chrono::milliseconds parseTime(const std::string& text);
 
 // Parses "4096", "64KiB", "4MiB" or "1GiB".
 //   throws  std::invalid_argument that shows the form
@@ -28,8 +25,10 @@ namespace mpf::router {
 [[nodiscard]] std::string limitType(const std::string& name);
 
 // Sets the limit `name`, one of limitNames(), to the value in `text`.
-//   throws  std::invalid_argument that shows the form or the range
-void setLimit(Limits& limits, const std::string& name, const std::string& text);
+//   missing  of a time without a unit: an error in a file, seconds on a command line
+//   throws   std::invalid_argument that shows the form or the range
+void setLimit(Limits& limits, const std::string& name, const std::string& text,
+              MissingUnit missing = MissingUnit::invalid);
 
 // The value in the form that setLimit() reads, with the largest unit that divides it.
 [[nodiscard]] std::string limitText(const Limits& limits, const std::string& name);

@@ -12,6 +12,7 @@
 namespace mpf::test {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
@@ -55,6 +56,37 @@ TEST_F(CommandLine, AcceptsValidArgumentsWithoutOutput) {
   EXPECT_EQ(more_, ~std::uint64_t{0});
   EXPECT_EQ(speed_, 1e-3);
   EXPECT_THAT(outcome.out + outcome.err, IsEmpty());
+}
+
+// A time has a unit, or is in seconds. The help shows the default with its unit.
+TEST_F(CommandLine, AcceptsTimes) {
+  std::chrono::milliseconds pause{1500}, whole{250};
+  addTime(app_, "--pause", pause, "How long", {.least = 1ms, .most = 1h});
+  addTime(app_, "--whole", whole, "How much longer", kAboveZero);
+  EXPECT_THAT(app_.help(), HasSubstr("--pause TIME=1500ms "));
+
+  EXPECT_EQ(parse({"--pause", "0.2min", "--whole", "0.0001"}).status, std::nullopt);
+  EXPECT_EQ(pause, 12s);
+  EXPECT_EQ(whole, 1ms) << "rounded up";
+  EXPECT_EQ(parse({"--pause", "2", "--whole", "300ms"}).status, std::nullopt);
+  EXPECT_EQ(pause, 2s);
+  EXPECT_EQ(whole, 300ms);
+
+  for (const auto& [word, text] : std::vector<std::pair<const char*, std::string>>{
+           {"soon",
+            "soon is not a time: use 200ms, 2s or 1.5min; a number without a unit is in "
+            "seconds;"},
+           {"-1", "-1 is not a time: "},
+           {"nan", "nan is not a time: "},
+           {"1e300", "1e300 is not a time: "},
+           {"0", "0 is out of range: use 1ms to 60min;"},
+           {"61min", "61min is out of range: use 1ms to 60min;"}}) {
+    const auto outcome = parse({"--pause", word});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, StartsWith("mpf-x: --pause: " + text));
+  }
+  EXPECT_THAT(parse({"--whole", "0"}).err, HasSubstr("0 is out of range: use more than 0s;"));
+  EXPECT_EQ(whole, 300ms) << "unchanged";
 }
 
 TEST_F(CommandLine, PrintsHelpAndVersionToStdout) {

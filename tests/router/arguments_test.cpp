@@ -77,7 +77,9 @@ TEST_F(ArgumentsTest, ConfigureASimpleClientRouter) {
                               "--buffer-size",
                               "1500",
                               "--dead-time",
-                              "5s"});
+                              "5",
+                              "--handshake-time",
+                              "0.1min"});
 
   EXPECT_EQ(started.status, std::nullopt) << started.err;
   EXPECT_THAT(config().remotes,
@@ -89,7 +91,8 @@ TEST_F(ArgumentsTest, ConfigureASimpleClientRouter) {
   EXPECT_EQ(config().logLevel, "debug");
   EXPECT_EQ(config().limits.queueSize, 40U);
   EXPECT_EQ(config().limits.bufferBytes, 1500U);
-  EXPECT_EQ(config().limits.deadTime, 5s);
+  EXPECT_EQ(config().limits.deadTime, 5s) << "without a unit";
+  EXPECT_EQ(config().limits.handshakeTime, 6s);
 }
 
 TEST_F(ArgumentsTest, OverrideTheFile) {
@@ -150,8 +153,8 @@ TEST_F(ArgumentsTest, AreNamedInErrors) {
        "--listen *:1: plain TCP at *:1, which is every network of this host: use TLS, or a "
        "loopback, private or link-local address, or write --allow-public-plain"},
       {{"--queue-size", "0"}, "--queue-size: 0 is out of range: use 1 to 1000000"},
-      {{"--dead-time", "2"},
-       "--dead-time: \"2\": write a time with its unit, such as 500ms, 2s or 1min"},
+      {{"--dead-time", "soon"},
+       "--dead-time: \"soon\": write a time with its unit, such as 500ms, 2s or 1min"},
       {{"--mode", "7"}, "--mode: 7: use an octal number between 0600 and 0666, such as 0660"},
       {{"--group", "no-such-group"}, "--group: no-such-group: there is no group of this name"},
       {{"--group", "root"}, "--group: the mode gives this group no access; write mode 0660, too"},

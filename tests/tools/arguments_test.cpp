@@ -10,7 +10,6 @@
 namespace mpf::tools {
 namespace {
 
-using namespace std::chrono_literals;
 using testing::HasSubstr;
 
 // Parses one word after the other as arguments of the program. Returns the error, or nothing.
@@ -30,14 +29,6 @@ class ToolArgumentsTest : public testing::Test {
     ::unsetenv("MPF_BACKPLANE");
     ::unsetenv("MPF_LOCATION");
   }
-  // The error for this value of an option for seconds, whose value is then in `seconds_`.
-  std::string secondsError(const std::string& word, bool mayBeZero) {
-    CLI::App app;
-    addSeconds(app, "--timeout", seconds_, "Longest wait", mayBeZero);
-    return errorOf(app, {"--timeout", word});
-  }
-
-  double seconds_ = 2.5;
 };
 
 TEST_F(ToolArgumentsTest, AServerIsItsNameLocationAndBackplane) {
@@ -82,34 +73,6 @@ TEST_F(ToolArgumentsTest, ABackplaneStaysEmptyUnlessTheUserNamesOne) {
 
   EXPECT_EQ(backplane, "");
   EXPECT_THAT(app.help(), HasSubstr("$MPF_BACKPLANE, or all backplanes"));
-}
-
-TEST_F(ToolArgumentsTest, SecondsAreNumbersFromZeroOrAboveZero) {
-  EXPECT_EQ(secondsError("0.25", false), "");
-  EXPECT_EQ(seconds_, 0.25);
-  EXPECT_EQ(secondsError("1e9", false), "");
-  EXPECT_EQ(secondsError("0", true), "");
-  EXPECT_EQ(seconds_, 0);
-
-  for (const std::string word : {"-1", "nan", "1e300", "1000000001", "soon"})
-    EXPECT_THAT(secondsError(word, true),
-                HasSubstr(word + " is not a time: use a number of seconds from 0 to 1e9"));
-  EXPECT_THAT(secondsError("0", false),
-              HasSubstr("0 is not a time: use a number of seconds above 0 to 1e9"));
-  EXPECT_EQ(seconds_, 0) << "unchanged";
-}
-
-TEST_F(ToolArgumentsTest, TheHelpOfSecondsShowsTheDefault) {
-  CLI::App app;
-  addSeconds(app, "--timeout", seconds_, "Longest wait", false);
-
-  EXPECT_THAT(app.help(), HasSubstr("--timeout SECONDS=2.5 "));
-}
-
-TEST(OfSeconds, AreNanoseconds) {
-  EXPECT_EQ(ofSeconds(0), 0ns);
-  EXPECT_EQ(ofSeconds(0.25), 250ms);
-  EXPECT_EQ(ofSeconds(1e9), 1'000'000'000s);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ class RemoteTest : public testing::Test {
     return runTool(std::move(arguments), routers_.far().name());
   }
   [[nodiscard]] nlohmann::json ls(const Backplane& backplane) const {
-    const auto ended = runTool({"ls", "--json", "--interval", "1"}, backplane.name());
+    const auto ended = runTool({"ls", "--json", "--interval", "1ms"}, backplane.name());
     EXPECT_EQ(ended.status, 0) << ended.err;
     return nlohmann::json::parse(ended.out).at(0);
   }
@@ -89,9 +89,9 @@ TEST_F(RemoteTest, ReportsShowServersOnOtherHosts) {
   awaitRoundTrip();
 
   const auto list = near({"ls"}).out;
-  const auto routers = near({"mrr", "--interval", "1"}).out;
+  const auto routers = near({"mrr", "--interval", "1ms"}).out;
   const auto server = near({"msr", "echo", "--location", "1"}).out;
-  const auto there = far({"mrr", "--interval", "1"}).out;
+  const auto there = far({"mrr", "--interval", "1ms"}).out;
 
   EXPECT_THAT(list, AllOf(ContainsRegex("  echo@1 +alive +[0-9]+ +→ "),
                           ContainsRegex("  → " + routers_.address() + " +connected +1 ")));
@@ -128,7 +128,7 @@ TEST_F(RemoteTest, ReportsShowALostConnectionAndItsReturn) {
   EXPECT_EQ(gone.at("round_trip_ns"), 0) << "the connection has ended";
   EXPECT_EQ(gone.at("in_queue"), 0);
   EXPECT_EQ(gone.at("queue_size"), 256);
-  EXPECT_THAT(near({"mrr", "--interval", "1"}).out, HasSubstr("   problem "));
+  EXPECT_THAT(near({"mrr", "--interval", "1ms"}).out, HasSubstr("   problem "));
   EXPECT_EQ(ls(routers_.far()).at("routers").at(0).at("state"), "dead");
   EXPECT_THAT(far({"clean"}).out, HasSubstr(".r."));
   EXPECT_THAT(ls(routers_.far()).at("routers"), IsEmpty());
@@ -146,7 +146,7 @@ TEST_F(RemoteTest, AClientOfAnAbsentServerWaitsAtTheRouter) {
             routers_.near().name());
   while (ls(routers_.near()).at("waiting").empty()) continue;
 
-  EXPECT_THAT(near({"mrr", "--interval", "1"}).out,
+  EXPECT_THAT(near({"mrr", "--interval", "1ms"}).out,
               HasSubstr("   Server later@1 has 1 client. bindState waiting for the server\n"));
 
   const EchoThread echo(routers_.far(), "later", {.location = RouterPair::kLocation});

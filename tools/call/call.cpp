@@ -33,9 +33,9 @@ struct CallArguments : ServerArguments {
   std::string type;
   std::vector<std::string> fields;
   std::uint64_t count = 1;
-  double timeout = 1;   // [s]
-  double interval = 0;  // [s]
-  double follow = 0;    // [s]
+  Nanoseconds timeout = std::chrono::seconds(1);
+  Nanoseconds interval{0};
+  Nanoseconds follow{0};
   bool json = false;
   bool printAll = false;
 };
@@ -83,7 +83,7 @@ class Caller {
         client_(Backplane::attach(arguments.backplane), arguments.server, arguments.location) {
     // A loop prints statistics at its end, and so a signal only ends the loop, after the call that
     // is in progress. For a single call a signal ends the program.
-    if (isLoop() || arguments_.follow > 0) {
+    if (isLoop() || arguments_.follow > Nanoseconds(0)) {
       stop_.emplace(
           [](void* stopped) noexcept { static_cast<std::atomic<bool>*>(stopped)->store(true); },
           &stopped_);
@@ -110,7 +110,7 @@ class Caller {
   [[nodiscard]] bool showsEach() const noexcept { return !isLoop() || arguments_.printAll; }
 
   void pause() const {
-    const auto until = Deadline::after(ofSeconds(arguments_.interval));
+    const auto until = Deadline::after(arguments_.interval);
     while (!stopped_ && !until.hasPassed())
       std::this_thread::sleep_for(std::min(kStopCheckInterval, until.left()));
   }
@@ -120,7 +120,7 @@ class Caller {
     auto message = tryParse(type_, arguments_.fields, error);
     if (!message) throw std::logic_error(error);  // cannot happen: call() has parsed it before
     const auto sentNs = Clock::nowNs();
-    auto answer = client_.call(std::move(*message), ofSeconds(arguments_.timeout));
+    auto answer = client_.call(std::move(*message), arguments_.timeout);
     if (answer) {
       recorder_->add(static_cast<std::uint64_t>(Clock::nowNs() - sentNs));
       if (showsEach()) show(answer.message());
@@ -150,8 +150,8 @@ class Caller {
 
   // Prints the messages that the server sends after the reply.
   void follow() {
-    const auto until = Deadline::after(ofSeconds(arguments_.follow));
-    while (arguments_.follow > 0 && !stopped_ && !until.hasPassed()) {
+    const auto until = Deadline::after(arguments_.follow);
+    while (arguments_.follow > Nanoseconds(0) && !stopped_ && !until.hasPassed()) {
       const auto wait = std::min(kStopCheckInterval, until.left());
       if (const auto message = client_.receive(wait)) show(message);
     }
@@ -234,7 +234,7 @@ void addCall(CLI::App& app, Run& run) {
   command.add_option(
       "fields", arguments->fields,
       R"(Its fields, as field=value: value=3, value=1,2,3, value='*IDN?\n', eomString='\r\n')");
-  addSeconds(command, "--timeout", arguments->timeout, "Longest wait for a reply", false);
+  addTime(command, "--timeout", arguments->timeout, "Longest wait for a reply", kAboveZero);
   command.add_option("--count", arguments->count, "Messages to send, each after a reply")
       ->capture_default_str()
       ->check(wholeNumber(1, std::uint64_t{1} << 53));

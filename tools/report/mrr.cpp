@@ -233,7 +233,7 @@ void addMrr(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
       "mrr", "Message router report: connections, queues and message rates of clients and servers");
   auto arguments = std::make_shared<ReportArguments>();
-  arguments->intervalMs = 1000;
+  arguments->interval = std::chrono::seconds(1);
   addReport(command, *arguments);
   command.callback([arguments, &run] { run = [arguments] { return report(*arguments); }; });
 }

@@ -13,10 +13,9 @@ namespace mpf::tools {
 
 void addReport(CLI::App& app, ReportArguments& arguments) {
   addBackplane(app, arguments.backplane, "all backplanes");
-  app.add_option("--interval", arguments.intervalMs,
-                 "Time between the two snapshots from which rates and stalls are found [ms]")
-      ->capture_default_str()
-      ->check(wholeNumber(1, 3'600'000));
+  addTime(app, "--interval", arguments.interval,
+          "Time between the two snapshots from which rates and stalls are found",
+          {.least = std::chrono::milliseconds(1), .most = std::chrono::hours(1)});
   addJson(app, arguments.json);
 }
 
@@ -31,7 +30,7 @@ int reportEach(const ReportArguments& arguments,
   const auto backplanes =
       arguments.backplane.empty() ? Backplane::names() : std::vector{arguments.backplane};
   for (const auto& backplane : backplanes) {
-    const SnapshotDelta delta(backplane, std::chrono::milliseconds(arguments.intervalMs));
+    const SnapshotDelta delta(backplane, arguments.interval);
     if (arguments.json) collect(delta, list);
     else print(delta);
   }

@@ -8,13 +8,15 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include <mpf/clock.h>
+
 #include "tools/report/snapshot_delta.h"
 
 namespace mpf::tools {
 
 struct ReportArguments {
   std::string backplane;
-  int intervalMs = 200;
+  Nanoseconds interval = std::chrono::milliseconds(200);
   bool json = false;
 };
 // Adds --backplane, --interval and --json.

@@ -53,7 +53,7 @@ const RouterLineView* findLine(const Snapshot& snapshot, std::uint64_t router,
              : nullptr;
 }
 
-Snapshot snapshotAfter(const std::string& backplane, std::chrono::milliseconds interval) {
+Snapshot snapshotAfter(const std::string& backplane, Nanoseconds interval) {
   std::this_thread::sleep_for(interval);
   return Snapshot::take(backplane);
 }
@@ -76,7 +76,7 @@ Totals Totals::of(const WindowView& window) noexcept {
   return totals;
 }
 
-SnapshotDelta::SnapshotDelta(const std::string& backplane, std::chrono::milliseconds interval)
+SnapshotDelta::SnapshotDelta(const std::string& backplane, Nanoseconds interval)
     // Braces, so that the arguments are evaluated from left to right.
     : SnapshotDelta{Snapshot::take(backplane), snapshotAfter(backplane, interval)} {}
 

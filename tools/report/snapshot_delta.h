@@ -5,9 +5,10 @@
 // Threads  one.
 #pragma once
 
-#include <chrono>
 #include <string>
 #include <unordered_map>
+
+#include <mpf/clock.h>
 
 #include "tools/report/snapshot.h"
 
@@ -28,7 +29,7 @@ struct LineRates {
 class SnapshotDelta {
  public:
   // Snapshots now, and again after `interval`.
-  SnapshotDelta(const std::string& backplane, std::chrono::milliseconds interval);
+  SnapshotDelta(const std::string& backplane, Nanoseconds interval);
   SnapshotDelta(Snapshot before, Snapshot now);
   SnapshotDelta(const SnapshotDelta&) = delete;
   SnapshotDelta& operator=(const SnapshotDelta&) = delete;

@@ -30,7 +30,7 @@ constexpr auto kFirstInterval = std::chrono::milliseconds(200);
 
 struct TopArguments {
   std::string backplane;
-  double seconds = 1;
+  Nanoseconds interval = std::chrono::seconds(1);
   int batch = 0;
   bool clients = false;
   bool routers = false;
@@ -71,7 +71,7 @@ int printBatch(const TopArguments& arguments) {
   SnapshotSeries series(arguments.backplane);
   TopView view;
   for (int i = 0; i < arguments.batch; ++i) {
-    std::this_thread::sleep_for(ofSeconds(arguments.seconds));
+    std::this_thread::sleep_for(arguments.interval);
     view.show(series.next());
     if (i == 0 && !prepare(view, arguments)) return 2;
     if (i != 0) fmt::print("\n");
@@ -97,11 +97,11 @@ int showLive(const TopArguments& arguments) {
   const StopEvent stop;  // before ncurses, which does not replace handlers that already exist
   TopView view;
   SnapshotSeries series(arguments.backplane);
-  std::this_thread::sleep_for(std::min<Nanoseconds>(ofSeconds(arguments.seconds), kFirstInterval));
+  std::this_thread::sleep_for(std::min<Nanoseconds>(arguments.interval, kFirstInterval));
   view.show(series.next());
   if (!prepare(view, arguments)) return 2;
   Screen screen;
-  auto due = Deadline::after(ofSeconds(arguments.seconds));
+  auto due = Deadline::after(arguments.interval);
   for (;;) {
     screen.draw(view.lines(screen.rows()));
     std::array<pollfd, 2> ready{{{STDIN_FILENO, POLLIN, 0}, {stop.descriptor(), POLLIN, 0}}};
@@ -113,7 +113,7 @@ int showLive(const TopArguments& arguments) {
     }
     if (!due.hasPassed()) continue;
     view.show(series.next());
-    due = Deadline::after(ofSeconds(arguments.seconds));
+    due = Deadline::after(arguments.interval);
   }
 }
 
@@ -125,7 +125,7 @@ void addTop(CLI::App& app, Run& run) {
                                       "hosts live: rates, queues, latencies, stalls");
   auto arguments = std::make_shared<TopArguments>();
   addBackplane(command, arguments->backplane, "\"default\"");
-  addSeconds(command, "--interval", arguments->seconds, "Time between two snapshots", false);
+  addTime(command, "--interval", arguments->interval, "Time between two snapshots", kAboveZero);
   command
       .add_option("--batch", arguments->batch,
                   "Print the table this number of times, without a live screen")

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "base/command_line.h"
 #include "tools/arguments.h"
 #include "tools/commands.h"
 #include "tools/tap/gpib_sniff_format.h"
@@ -13,7 +14,7 @@ namespace mpf::tools {
 namespace {
 
 struct GpibSniffArguments : ServerArguments {
-  double seconds = 0;
+  Nanoseconds duration{0};
   bool decode = false;
   bool json = false;
 
@@ -30,7 +31,7 @@ void addGpibSniff(CLI::App& app, Run& run) {
       "gpib-sniff", "Shows every byte that a GPIB server sends (T) and receives (R), live");
   auto arguments = std::make_shared<GpibSniffArguments>();
   addServer(command, *arguments);
-  addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
+  addTime(command, "seconds", arguments->duration, "Duration; 0: until Ctrl-C");
   auto* const decode = command.add_flag(
       "--decode", arguments->decode,
       "Names of commands (UNL, LAG 22, TAG 5), data and EOI, with times; otherwise as the "
@@ -45,7 +46,7 @@ void addGpibSniff(CLI::App& app, Run& run) {
                     .backplane = arguments->backplane,
                     .location = arguments->location,
                     .server = arguments->server,
-                    .seconds = arguments->seconds},
+                    .duration = arguments->duration},
                    std::make_unique<SniffTextOf<GpibSniffFormat>>(std::move(format)));
     };
   });

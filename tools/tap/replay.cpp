@@ -34,8 +34,8 @@ struct ReplayArguments {
   std::string backplane;
   std::string server;
   std::int32_t location = 0;
-  double speed = 1;     // 0: as fast as the server accepts them
-  double timeout = 10;  // [s]
+  double speed = 1;  // 0: as fast as the server accepts them
+  Nanoseconds timeout = std::chrono::seconds(10);
   bool json = false;
   bool asServer = false;
 };
@@ -98,7 +98,7 @@ class Replayer {
     client =
         std::make_unique<MessageClient>(dispatcher_, [this](Message&& message) { count(message); });
     client->bind(server_, arguments_.location);
-    if (client->connectWait(ofSeconds(arguments_.timeout))) return client.get();
+    if (client->connectWait(arguments_.timeout)) return client.get();
     problem_ = client->notConnectedBecause() + "; `mpf ls` shows all servers";
     return nullptr;
   }
@@ -120,7 +120,7 @@ class Replayer {
   // server had room for, and this server may have less.
   void send(MessageClient& client, Message&& message) {
     ++requests_;
-    const auto limit = Deadline::after(ofSeconds(arguments_.timeout));
+    const auto limit = Deadline::after(arguments_.timeout);
     for (;;) {
       // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
       const auto result = client.send(std::move(message), limit);
@@ -151,7 +151,7 @@ class Replayer {
   }
 
   void awaitRest() {
-    const auto limit = Deadline::after(ofSeconds(arguments_.timeout));
+    const auto limit = Deadline::after(arguments_.timeout);
     while (open_ > 0 && !stopped_ && !limit.hasPassed()) dispatcher_.runOnce(limit);
     if (open_ > 0) ends_["no reply yet"] += open_;
   }
@@ -230,8 +230,8 @@ void addReplay(CLI::App& app, Run& run) {
                   "2: twice as fast as recorded; 0: as fast as possible")
       ->capture_default_str()
       ->check(number(0, 1e6));
-  addSeconds(command, "--timeout", arguments->timeout,
-             "Longest wait for the server, for room in its queue, and for the last reply", false);
+  addTime(command, "--timeout", arguments->timeout,
+          "Longest wait for the server, for room in its queue, and for the last reply", kAboveZero);
   addJson(command, arguments->json);
   command.footer(
       "Exit status: 0 every request got a reply; 1 a request got no reply; 2 usage error. With "

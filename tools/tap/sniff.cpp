@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "base/command_line.h"
 #include "tools/arguments.h"
 #include "tools/commands.h"
 #include "tools/tap/sniff_format.h"
@@ -13,7 +14,7 @@ namespace mpf::tools {
 namespace {
 
 struct SniffArguments : ServerArguments {
-  double seconds = 0;
+  Nanoseconds duration{0};
   std::string format = "lines";
   bool json = false;
 };
@@ -25,7 +26,7 @@ void addSniff(CLI::App& app, Run& run) {
       "sniff", "Shows every byte that a serial server sends (T) and receives (R), live");
   auto arguments = std::make_shared<SniffArguments>();
   addServer(command, *arguments);
-  addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
+  addTime(command, "seconds", arguments->duration, "Duration; 0: until Ctrl-C");
   command
       .add_option("--format", arguments->format,
                   "lines: one direction in a line, with times; manual: ten bytes in a line, as the "
@@ -42,7 +43,7 @@ void addSniff(CLI::App& app, Run& run) {
                     .backplane = arguments->backplane,
                     .location = arguments->location,
                     .server = arguments->server,
-                    .seconds = arguments->seconds},
+                    .duration = arguments->duration},
                    std::make_unique<SniffTextOf<SniffFormat>>(std::move(format)));
     };
   });

@@ -35,7 +35,7 @@ class Sniffer {
     const auto limit = Deadline::after(kConnectLimit);
     while (!client_.isConnected() && !isOver(limit)) dispatcher_.runOnce(limit);
     const auto end =
-        options_.seconds > 0 ? Deadline::after(ofSeconds(options_.seconds)) : Deadline::never();
+        options_.duration > Nanoseconds(0) ? Deadline::after(options_.duration) : Deadline::never();
     if (!client_.isConnected()) {
       printError("{}: {}; check with `mpf ls` that it is {}\n", program_,
                  client_.notConnectedBecause(), options_.kind);

@@ -61,7 +61,7 @@ struct SnifferOptions {
   std::string backplane;
   std::int32_t location = 0;
   std::string server;
-  double seconds = 0;  // 0: until a signal
+  Nanoseconds duration{0};  // 0: until a signal
 };
 
 // Listens for the time or until SIGINT or SIGTERM. Returns the exit status.

@@ -22,8 +22,8 @@ namespace mpf::tools {
 namespace {
 
 struct TapArguments : ServerArguments {
-  double seconds = 0;
-  double poll = 0.001;  // [s]
+  Nanoseconds duration{0};
+  Nanoseconds poll = std::chrono::milliseconds(1);
   std::uint64_t count = 0;
   std::string link;
   std::string file;
@@ -68,16 +68,16 @@ int tap(const TapArguments& arguments) {
   }
 
   const auto end =
-      arguments.seconds > 0 ? Deadline::after(ofSeconds(arguments.seconds)) : Deadline::never();
+      arguments.duration > Nanoseconds(0) ? Deadline::after(arguments.duration) : Deadline::never();
   const auto isOver = [&] {
     return stopped || end.hasPassed() ||
            (arguments.count != 0 && session.seen() >= arguments.count);
   };
-  auto pause = ofSeconds(arguments.poll);
+  auto pause = arguments.poll;
   while (!isOver()) {
     // More messages are likely to follow soon: the first pauses are short, later ones are longer.
-    if (session.runOnce()) pause = ofSeconds(arguments.poll) / kShortPauses;
-    else session.pause(pause = std::min(2 * pause, ofSeconds(arguments.poll)));
+    if (session.runOnce()) pause = arguments.poll / kShortPauses;
+    else session.pause(pause = std::min(2 * pause, arguments.poll));
   }
   session.finish();
   sink->finish();
@@ -96,7 +96,7 @@ void addTap(CLI::App& app, Run& run) {
       "tap", "Shows every message between a server and its clients, live, without taking part");
   auto arguments = std::make_shared<TapArguments>();
   addServer(command, *arguments);
-  addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
+  addTime(command, "seconds", arguments->duration, "Duration; 0: until Ctrl-C");
   command.add_option("--count", arguments->count, "End after this many messages; 0: no limit")
       ->capture_default_str()
       ->check(wholeNumber(0));
@@ -106,8 +106,8 @@ void addTap(CLI::App& app, Run& run) {
       .add_option("--write", arguments->file,
                   "Write to this file, for `mpf replay`, instead of to stdout")
       ->type_name("FILE");
-  addSeconds(command, "--poll", arguments->poll,
-             "Longest pause between two reads of links without new messages", false);
+  addTime(command, "--poll", arguments->poll,
+          "Longest pause between two reads of links without new messages", kAboveZero);
   command.add_flag("--print", arguments->printAll, "Print arrays in full");
   addJson(command, arguments->json);
   command.footer(

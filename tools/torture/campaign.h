@@ -12,13 +12,15 @@
 #include <string>
 #include <vector>
 
+#include <mpf/clock.h>
+
 #include "tools/torture/tally.h"
 
 namespace mpf::torture {
 
 struct CampaignOptions {
   Referee::Options referee;
-  std::chrono::duration<double> duration{60};
+  Nanoseconds duration = std::chrono::seconds(60);
   std::vector<std::string> steps;  // empty: all
   std::optional<Role> role;  // empty: both
   std::optional<Mode> mode;  // empty: both

@@ -14,7 +14,6 @@
 #include "base/output_file.h"
 #include "base/print_error.h"
 #include "base/run_main.h"
-#include "tools/arguments.h"
 #include "tools/text/json_text.h"
 #include "tools/torture/campaign.h"
 
@@ -23,8 +22,6 @@ namespace {
 
 struct Arguments {
   CampaignOptions campaign;
-  double seconds = 60;
-  double patience = 30;
   std::string everyInstruction;
   std::string json;
   bool list = false;
@@ -83,8 +80,6 @@ int run(const Arguments& arguments) {
   auto options = arguments.campaign;
   if (!arguments.everyInstruction.empty()) options.steps = {arguments.everyInstruction};
   options.everyInstruction = !arguments.everyInstruction.empty();
-  options.duration = std::chrono::duration<double>(arguments.seconds);
-  options.referee.patience = std::chrono::duration<double>(arguments.patience);
   checkSteps(marks, options.steps);
   auto verdict = openVerdict(arguments.json);
   const auto tally = Campaign(marks, options, progress()).run();
@@ -100,8 +95,8 @@ int run(const Arguments& arguments) {
 void addOptions(CLI::App& command, Arguments& arguments) {
   auto& options = arguments.campaign;
   options.referee.seed = std::random_device()();
-  tools::addSeconds(command, "--duration", arguments.seconds,
-                    "Time for random steps, after one round for each", true);
+  addTime(command, "--duration", options.duration,
+          "Time for random places, after each step was tested once");
   command
       .add_option("--seed", options.referee.seed,
                   "Seed of the random numbers; it is printed at the end")
@@ -118,8 +113,8 @@ void addOptions(CLI::App& command, Arguments& arguments) {
       ->check(wholeNumber(0));
   command.add_option("--every-instruction", arguments.everyInstruction,
                      "A round for each instruction from this step to the next one");
-  tools::addSeconds(command, "--patience", arguments.patience,
-                    "Longest wait for a condition that must become true", false);
+  addTime(command, "--patience", options.referee.patience,
+          "Longest wait for a condition that must become true", kAboveZero);
   command.add_option("--json", arguments.json, "Also writes the verdict to this file, as JSON")
       ->type_name("FILE");
   addChoice(command, "--break", options.referee.sabotage, kSabotages, "")->group("");

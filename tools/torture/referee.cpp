@@ -10,6 +10,8 @@
 #include <mpf/backplane.h>
 #include <mpf/clock.h>
 
+#include "base/time_text.h"
+
 namespace mpf::torture {
 namespace {
 
@@ -29,7 +31,7 @@ constexpr std::size_t kMoreHeapKiB = 16 * 1024UL;
 #endif
 constexpr std::uint64_t kWarmUp = 20;  // rounds
 // For a condition that a mistake prevents. Without it, the condition becomes true, however late.
-constexpr std::chrono::duration<double> kPatienceIfBroken{8};
+constexpr Nanoseconds kPatienceIfBroken = std::chrono::seconds(8);
 
 std::string statusText(int status) {
   if (WIFSIGNALED(status)) return fmt::format("was killed by signal {}", WTERMSIG(status));
@@ -78,7 +80,7 @@ void Referee::waitFor(const std::string& what, const Condition& condition, Sabot
     // waits for one, the actors are not to blame for the delay.
     waited += std::min<Nanoseconds>(Nanoseconds(Clock::nowNs() - sinceNs), kPollInterval);
     if (waited >= patience)
-      throw Broken(fmt::format("this did not happen within {} s: {}", patience.count(), what));
+      throw Broken(fmt::format("this did not happen within {}: {}", timeText(patience), what));
   }
 }
 

@@ -21,6 +21,7 @@
 #include <string>
 
 #include <mpf/backplane.h>
+#include <mpf/clock.h>
 
 #include "tools/torture/actors.h"
 #include "tools/torture/checks.h"
@@ -61,7 +62,7 @@ class Referee {
  public:
   struct Options {
     std::uint32_t seed = 0;
-    std::chrono::duration<double> patience{30};  // longest wait for anything that must happen
+    Nanoseconds patience = std::chrono::seconds(30);  // longest wait for anything that must happen
     Sabotage sabotage = Sabotage::none;
   };
   // Starts the survivors on a new isolated backplane. At the end all actors are killed, and the

@@ -20,9 +20,9 @@ namespace mpf {
 // What the server allows to a request.
 struct GpibLimits {
   std::size_t bufferBytes = 4096;  // longest read
-  std::chrono::seconds timeout{3};  // of requests with timeout 0
-  std::chrono::seconds maxTimeout{60};
-  std::chrono::seconds maxLease{60};
+  std::chrono::milliseconds timeout{3000};  // of requests with timeout 0
+  std::chrono::milliseconds maxTimeout{60'000};
+  std::chrono::milliseconds maxLease{60'000};
 };
 
 struct GpibRequest {

@@ -11,15 +11,7 @@ namespace mpf {
 namespace {
 
 constexpr int kLongestBuffer = 16 << 20;
-constexpr int kLongestSeconds = 86'400;
-
-void addLimit(CLI::App& app, const std::string& option, std::chrono::seconds& time,
-              const std::string& help) {
-  app.add_option_function<int>(
-         option, [&time](int value) { time = std::chrono::seconds(value); }, help)
-      ->check(wholeNumber(1, kLongestSeconds))
-      ->default_str(std::to_string(time.count()));
-}
+constexpr TimeRange kLimit{.least = std::chrono::seconds(1), .most = std::chrono::hours(24)};
 
 }  // namespace
 
@@ -36,10 +28,10 @@ std::optional<int> GpibStartOptions::parse(int argc, char** argv) {
       ->capture_default_str()
       ->check(wholeNumber(1, kLongestBuffer));
   arguments.addQueueSizeTo(app);
-  addLimit(app, "--timeout", limits.timeout, "Timeout of requests that have none [s]");
-  addLimit(app, "--max-timeout", limits.maxTimeout,
-           "Longest time that one request may wait and use the bus [s]");
-  addLimit(app, "--max-lease", limits.maxLease, "Longest lease of the bus by one client [s]");
+  addTime(app, "--timeout", limits.timeout, "Timeout of requests that have none", kLimit);
+  addTime(app, "--max-timeout", limits.maxTimeout,
+          "Longest time that one request may wait and use the bus", kLimit);
+  addTime(app, "--max-lease", limits.maxLease, "Longest lease of the bus by one client", kLimit);
   ti9914.addTo(app);
   hardware.addTo(app);
   app.get_option("--wait")->description("Start even if the controller is missing, and wait for it");

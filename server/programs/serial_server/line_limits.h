@@ -24,7 +24,7 @@ struct LineLimits {
   // The silence instead of it, after an answer that was late, damaged or too long.
   std::chrono::milliseconds quietTime{100};
   std::chrono::milliseconds resyncLimit{1000};  // longest wait for a late answer
-  std::chrono::seconds maxTimeout{60};  // of one request, including its retries
+  std::chrono::milliseconds maxTimeout{60'000};  // of one request, including its retries
   int maxRetries = 10;
 
   // The longest wait until a request can be sent.

@@ -8,6 +8,7 @@
 
 #include <mpf/serial_commands.h>
 
+#include "base/time_text.h"
 #include "server/programs/hardware/other_types.h"
 
 namespace mpf {
@@ -104,9 +105,9 @@ void SerialServer::noteLimits(const Char8Array& request) {
   if (timeoutOf(request) <= limits_.maxTimeout && request.numberRetrys <= limits_.maxRetries)
     return;
   log_->warn(
-      "a request is limited to {} s (--max-timeout) and {} retries (--max-retries): cmd {:#x}, "
+      "a request is limited to {} (--max-timeout) and {} retries (--max-retries): cmd {:#x}, "
       "timeout {}, numberRetrys {}",
-      limits_.maxTimeout.count(), limits_.maxRetries, request.cmd, request.timeout,
+      timeText(limits_.maxTimeout), limits_.maxRetries, request.cmd, request.timeout,
       request.numberRetrys);
 }
 

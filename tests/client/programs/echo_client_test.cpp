@@ -46,7 +46,10 @@ class EchoClientTest : public testing::Test {
   const TestBackplane backplane_;
   MessageServer server_{backplane_, "Int32"};
   std::thread serving_;
-  EchoClient echo_{"mpf-x-client", "Int32", "Int32 message",
+  EchoClient echo_{"mpf-x-client",
+                   "Int32",
+                   "Int32 message",
+                   true,
                    [](int i, std::size_t bytes) {
                      return Int32Message({.extra = static_cast<std::int32_t>(bytes), .value = i});
                    },
@@ -65,7 +68,7 @@ TEST_F(EchoClientTest, SendsTheMessagesAndReportsTheirRoundTrips) {
     sizes.push_back(request.extra);
   });
 
-  EXPECT_EQ(run({"--count", "3", "--bytes", "7", "--timeout", "60000"}), 0);
+  EXPECT_EQ(run({"--count", "3", "--bytes", "7", "--timeout", "60"}), 0);
 
   EXPECT_THAT(out_, StartsWith("3 came back, 0 did not; round trip: p50 "));
   EXPECT_THAT(errors_, IsEmpty());
@@ -76,14 +79,14 @@ TEST_F(EchoClientTest, SendsTheMessagesAndReportsTheirRoundTrips) {
 TEST_F(EchoClientTest, FailsWhenAReplyDiffers) {
   serve([](Int32& request) { request.value += request.value == 1 ? 1 : 0; });
 
-  EXPECT_EQ(run({"--count", "3", "--timeout", "60000"}), 1);
+  EXPECT_EQ(run({"--count", "3", "--timeout", "60"}), 1);
 
   EXPECT_THAT(out_, StartsWith("2 came back, 1 did not; round trip: "));
   EXPECT_EQ(errors_, "message 1: the reply differs from the message\n");
 }
 
 TEST_F(EchoClientTest, SaysWhyAServerIsNotReached) {
-  EXPECT_EQ(run({"nobody", "--count", "2", "--timeout", "1"}), 1);
+  EXPECT_EQ(run({"nobody", "--count", "2", "--timeout", "1ms"}), 1);
 
   EXPECT_EQ(out_, "0 came back, 2 did not\n");
   EXPECT_THAT(errors_, HasSubstr("message 0: not sent: not connected: server \"nobody\" at "
@@ -91,7 +94,7 @@ TEST_F(EchoClientTest, SaysWhyAServerIsNotReached) {
 }
 
 TEST_F(EchoClientTest, ReportsManyFailuresInFewLines) {
-  EXPECT_EQ(run({"nobody", "--count", "100", "--timeout", "1"}), 1);
+  EXPECT_EQ(run({"nobody", "--count", "100", "--timeout", "1ms"}), 1);
 
   EXPECT_EQ(out_, "0 came back, 100 did not\n");
   EXPECT_LT(std::ranges::count(errors_, '\n'), 50);
@@ -102,7 +105,10 @@ TEST_F(EchoClientTest, RefusesInvalidArguments) {
   EXPECT_EQ(run({"--count", "0"}), 2);
   EXPECT_THAT(errors_, HasSubstr("--count: 0 is out of range: use 1 to 2147483647"));
   EXPECT_EQ(run({"--timeout", "0"}), 2);
+  EXPECT_THAT(errors_, HasSubstr("--timeout: 0 is out of range: use more than 0s"));
   EXPECT_EQ(run({"--bytes", "1073741825"}), 2);
+  echo_.isArray = false;
+  EXPECT_EQ(run({"--bytes", "7"}), 2) << "a message without an array has no size";
 }
 
 }  // namespace

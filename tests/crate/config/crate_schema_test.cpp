@@ -2,6 +2,7 @@
 // crateSchema(): has the keys that readCrate() accepts.
 #include "crate/config/crate_schema.h"
 
+#include <regex>
 #include <set>
 
 #include "crate/config/program_kinds.h"
@@ -35,6 +36,21 @@ using CrateSchemaTest = CrateTextTest;
 
 TEST_F(CrateSchemaTest, HasTheKeysOfTheCrate) {
   EXPECT_EQ(keysOf(crateSchema()), keysIn(errorsOf("qqqqqqqqqqqqqqqqqqqq = 1\n")));
+}
+
+// An editor accepts the times that readCrate() accepts.
+TEST_F(CrateSchemaTest, AcceptsTheTimesOfACrate) {
+  const auto keys = crateSchema()["properties"]["supervision"]["properties"];
+  const std::regex time(keys["stop-time"]["pattern"].get<std::string>());
+  for (const std::string text : {"500ms", "2s", "10min", "1.5min", "0.25s", "", "5", "0s", "0.0s",
+                                 "1h", "1 s", "-1s", "off"}) {
+    const auto errors = errorsOf("[supervision]\nstop-time = \"" + text + "\"\n");
+    EXPECT_EQ(std::regex_search(text, time), errors.empty()) << text << errors;
+  }
+  const std::regex timeOrOff(keys["stall-limit"]["pattern"].get<std::string>());
+  EXPECT_TRUE(std::regex_search("off", timeOrOff));
+  EXPECT_TRUE(std::regex_search("1.5s", timeOrOff));
+  EXPECT_FALSE(std::regex_search("0s", timeOrOff));
 }
 
 TEST_F(CrateSchemaTest, HasTheKeysOfEachProgram) {

@@ -66,7 +66,7 @@ octal-uart = {module = "UART0", carrier = "ipac", site = "IP_a", nports = 8}
 octal-port = [{port = "UART0[0]", module = "UART0", n = 0, flow = "H"}, "UART0[1],UART0,1"]
 server = [{server = "a", port = "UART0[0]", eomstr = "\\r"}]
 octal-timing = true
-settle-time = 7
+settle-time = "7ms"
 needs = ["router"]
 location = 4
 user = "root"
@@ -117,7 +117,7 @@ command = ["viewer", "--all"]
               ElementsAre("UART0[0],UART0,0,,,,,H", "UART0[1],UART0,1"));
   EXPECT_THAT(uart.find("server")->values, ElementsAre("a,UART0[0],,,\\r"));
   EXPECT_EQ(uart.valueOf("octal-timing"), "true");
-  EXPECT_EQ(uart.valueOf("settle-time"), "7");
+  EXPECT_EQ(uart.valueOf("settle-time"), "7ms");
   EXPECT_THAT(uart.needs, ElementsAre("router"));
   EXPECT_EQ(uart.location, 4);
   EXPECT_EQ(uart.user, "root");
@@ -178,6 +178,8 @@ TEST(ParseDuration, NeedsAUnit) {
   EXPECT_EQ(parseDuration("500ms"), 500ms);
   EXPECT_EQ(parseDuration("2s"), 2s);
   EXPECT_EQ(parseDuration("3min"), 3min);
+  EXPECT_EQ(parseDuration("1.5min"), 90s);
+  EXPECT_EQ(parseDuration("0.5ms"), 1ms) << "rounded up";
   for (const auto* const text : {"", "5", "s", "0s", "-1s", "1h", "1 s", "99999999999s", "off"})
     EXPECT_THROW(static_cast<void>(parseDuration(text)), std::invalid_argument) << text;
 }

@@ -151,7 +151,7 @@ TEST_F(LogStormTest, OfAClientProgramWhoseMessagesAreRefused) {
   constexpr std::uint64_t kMessages = 2000;  // one by one
   start({MPF_TEST_CHAR8_ARRAY_SERVER});
   Program client({MPF_TEST_INT32_CLIENT, "Char8Array", "--backplane", backplane_.name(), "--count",
-                  std::to_string(kMessages), "--timeout", "60000"});
+                  std::to_string(kMessages), "--timeout", "60"});
 
   const auto said = client.errors();
 

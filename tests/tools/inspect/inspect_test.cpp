@@ -45,11 +45,11 @@ class InspectTest : public ToolsTest {
     ToolsTest::TearDown();
   }
   [[nodiscard]] nlohmann::json summary() const {
-    return report({"inspect", "--interval", "1"}).at(0);
+    return report({"inspect", "--interval", "1ms"}).at(0);
   }
   [[nodiscard]] nlohmann::json theLink(std::vector<std::string> more = {}) const {
     more.insert(more.begin(), {"inspect", summary().at("links").at(0).at("link").get<std::string>(),
-                               "--interval", "1"});
+                               "--interval", "1ms"});
     return report(more).at(0);
   }
   // Copies all files of the backplane, as a user does after a failure.
@@ -142,7 +142,7 @@ TEST_F(InspectTest, AServerShowsItsWindowItsHintsAndItsLinks) {
   peer->notify(300);
   peer->knock(0x77);
 
-  const auto shown = report({"inspect", "dac", "--interval", "1"});
+  const auto shown = report({"inspect", "dac", "--interval", "1ms"});
   const auto text = run({"inspect", "dac", "--last", "3", "--raw"}).out;
 
   ASSERT_THAT(shown, SizeIs(1));

@@ -77,7 +77,7 @@ TEST_F(ReportTest, ListsAClientThatWaitsForItsServer) {
 
   const auto all = ls();
   const auto text = run({"ls"}).out;
-  const auto routers = run({"mrr", "--interval", "1"}).out;
+  const auto routers = run({"mrr", "--interval", "1ms"}).out;
 
   EXPECT_EQ(all.at("waiting"),
             (nlohmann::json{{{"server", "later"}, {"location", 3}, {"pid", ::getpid()}}}));
@@ -94,7 +94,7 @@ TEST_F(ReportTest, ReportsADeadServerAsDead) {
   victim.end(SIGKILL);
 
   EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "dead");
-  EXPECT_THAT(inOneLine(run({"mrr", "--interval", "1"}).out),
+  EXPECT_THAT(inOneLine(run({"mrr", "--interval", "1ms"}).out),
               HasSubstr("] dead (removed by the next program that attaches) queueSize 32 "));
   EXPECT_THAT(run({"msr", "echo"}).out, HasSubstr("              state dead, pid "));
   static_cast<void>(backplane_.removeDead());

@@ -22,7 +22,7 @@ TEST_F(ReportTest, MrrPrintsTheLinesOfTheManual) {
   ASSERT_EQ(send(), SendResult::sent);
   const auto us = "tools_test\\[" + std::to_string(::getpid()) + "\\]";
 
-  const auto ended = run({"mrr", "--interval", "100"});
+  const auto ended = run({"mrr", "--interval", "100ms"});
 
   EXPECT_EQ(ended.status, 0);
   // Joins a line of more than 80 columns, which a long pid may cause.

@@ -124,7 +124,7 @@ TEST_F(ReadOnlyTest, ReportsForeignFilesAsProblems) {
   std::filesystem::create_symlink(loop, loop);
 
   for (const auto& arguments :
-       std::vector<std::vector<std::string>>{{"ls"}, {"mrr", "--interval", "1"}}) {
+       std::vector<std::vector<std::string>>{{"ls"}, {"mrr", "--interval", "1ms"}}) {
     const auto ended = run(arguments);
 
     EXPECT_EQ(ended.status, 0);
@@ -150,7 +150,7 @@ TEST_F(ReadOnlyTest, EscapesControlCharactersInFileNames) {
   std::ofstream(path) << "junk";
 
   for (const auto& arguments : std::vector<std::vector<std::string>>{{"ls"},
-                                                                     {"mrr", "--interval", "1"},
+                                                                     {"mrr", "--interval", "1ms"},
                                                                      {"msr"},
                                                                      {"inspect"},
                                                                      {"clean", "--dry-run"},

@@ -42,7 +42,7 @@ TEST_F(ReportTest, EscapesFormatCharactersInNamesAndFindsEscapedNames) {
 
   for (const std::vector<std::string>& report :
        std::vector<std::vector<std::string>>{{"ls"},
-                                             {"mrr", "--interval", "1"},
+                                             {"mrr", "--interval", "1ms"},
                                              {"msr"},
                                              {"inspect"},
                                              {"top", "--batch", "1"},
@@ -72,7 +72,7 @@ TEST_F(ReportTest, DistinguishesServersOfOneNameAtTwoLocations) {
   while (!second.isConnected()) dispatcher_->runOnce(Deadline::after(100us));
 
   const auto text = run({"ls"}).out;
-  const auto routers = run({"mrr", "--interval", "1"}).out;
+  const auto routers = run({"mrr", "--interval", "1ms"}).out;
 
   EXPECT_THAT(text, HasSubstr("dac, dac@2\n"));
   EXPECT_THAT(routers, AllOf(HasSubstr("   Server dac has 1 client. bindState connected\n   Server "
@@ -93,7 +93,7 @@ TEST_F(ReportTest, ShowsAProcessWithThousandsOfClientsInOneLine) {
   const auto text = run({"ls"}).out;
 
   EXPECT_THAT(text, HasSubstr("  echo x 3000\n"));
-  EXPECT_THAT(run({"mrr", "--interval", "1"}).out,
+  EXPECT_THAT(run({"mrr", "--interval", "1ms"}).out,
               HasSubstr("   Server echo has 3000 clients. bindState connected\n"));
 }
 
@@ -133,7 +133,7 @@ TEST_F(ReportTest, LongNamesFitIntoEightyColumns) {
 
   const auto list = run({"ls"}).out;
   const auto server = run({"msr", name}).out;
-  const auto routers = run({"mrr", "--interval", "1"}).out;
+  const auto routers = run({"mrr", "--interval", "1ms"}).out;
   const auto summary = run({"inspect"}).out;
 
   EXPECT_LE(widestOf(routers), 80U) << routers;

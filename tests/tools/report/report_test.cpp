@@ -13,7 +13,7 @@ using testing::StartsWith;
 
 TEST_F(ReportTest, ReportsAnEmptyBackplane) {
   EXPECT_EQ(run({"ls"}).out, "backplane " + backplane_.name() + "\n  no server\n  no client\n");
-  EXPECT_EQ(run({"mrr", "--interval", "1"}).out,
+  EXPECT_EQ(run({"mrr", "--interval", "1ms"}).out,
             "backplane " + backplane_.name() + "\nclientRouterList\nserverRouterList\n");
   EXPECT_EQ(run({"msr"}).out, "no server\n");
   EXPECT_EQ(report({"msr"}), nlohmann::json::array());
@@ -54,7 +54,7 @@ TEST_F(ReportTest, ReportsAllBackplanesWithoutAName) {
   const TestBackplane elsewhere;
   const MessageServer there(elsewhere, "there");
 
-  const auto ended = runTool({"msr", "--json", "--interval", "1"}, "");
+  const auto ended = runTool({"msr", "--json", "--interval", "1ms"}, "");
 
   EXPECT_EQ(ended.status, 0);
   const auto all = nlohmann::json::parse(ended.out);

@@ -45,7 +45,7 @@ class RouterReportTest : public ToolsTest {
     while (ls().at("waiting").size() != pendingBinds) dispatcher_.runOnce(Deadline::after(1ms));
   }
   [[nodiscard]] std::vector<std::string> mrr() const {
-    return linesOf(run({"mrr", "--interval", "1"}).out);
+    return linesOf(run({"mrr", "--interval", "1ms"}).out);
   }
   static std::string us() { return "[" + std::to_string(::getpid()) + "]"; }
 

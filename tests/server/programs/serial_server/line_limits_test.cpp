@@ -20,7 +20,7 @@ LineLimits parseLimits(const std::string& line) {
 }
 
 TEST(LineLimits, OptionsThatAreLeftOutKeepTheDefaults) {
-  const auto limits = parseLimits("--quiet-time 250");
+  const auto limits = parseLimits("--quiet-time 250ms");
 
   EXPECT_EQ(limits.settleTime, LineLimits().settleTime);
   EXPECT_EQ(limits.quietTime, 250ms);
@@ -29,14 +29,14 @@ TEST(LineLimits, OptionsThatAreLeftOutKeepTheDefaults) {
   EXPECT_EQ(limits.maxRetries, LineLimits().maxRetries);
 }
 
-TEST(LineLimits, EachOptionSetsItsLimitInItsUnit) {
+TEST(LineLimits, EachOptionSetsItsLimit) {
   const auto limits = parseLimits(
-      "--settle-time 1 --quiet-time 2 --resync-limit 3 --max-timeout 4 --max-retries 5");
+      "--settle-time 1ms --quiet-time 0.2 --resync-limit 3s --max-timeout 1.5min --max-retries 5");
 
   EXPECT_EQ(limits.settleTime, 1ms);
-  EXPECT_EQ(limits.quietTime, 2ms);
-  EXPECT_EQ(limits.resyncLimit, 3ms);
-  EXPECT_EQ(limits.maxTimeout, 4s);
+  EXPECT_EQ(limits.quietTime, 200ms);
+  EXPECT_EQ(limits.resyncLimit, 3s);
+  EXPECT_EQ(limits.maxTimeout, 90s);
   EXPECT_EQ(limits.maxRetries, 5);
 }
 
@@ -46,8 +46,8 @@ TEST(LineLimits, EachOptionAcceptsItsBoundsAndNothingBeyond) {
     long least, most;
   };
   for (const auto& [option, least, most] :
-       {Range{"--settle-time", 0, 3'600'000}, Range{"--quiet-time", 0, 3'600'000},
-        Range{"--resync-limit", 0, 3'600'000}, Range{"--max-timeout", 1, 86'400},
+       {Range{"--settle-time", 0, 3600}, Range{"--quiet-time", 0, 3600},
+        Range{"--resync-limit", 0, 3600}, Range{"--max-timeout", 1, 86'400},
         Range{"--max-retries", 0, 1'000'000}}) {
     const auto with = [&](long value) { return option + "=" + std::to_string(value); };
     EXPECT_NO_THROW(parseLimits(with(least))) << option;
@@ -63,8 +63,8 @@ TEST(LineLimits, TheHelpShowsTheDefaults) {
   limits.addTo(app);
 
   for (const auto& [option, value] :
-       {std::pair("--settle-time", "5"), std::pair("--quiet-time", "100"),
-        std::pair("--resync-limit", "1000"), std::pair("--max-timeout", "60"),
+       {std::pair("--settle-time", "5ms"), std::pair("--quiet-time", "100ms"),
+        std::pair("--resync-limit", "1s"), std::pair("--max-timeout", "1min"),
         std::pair("--max-retries", "10")})
     EXPECT_EQ(app.get_option(option)->get_default_str(), value);
 }

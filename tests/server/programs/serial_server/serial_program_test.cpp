@@ -199,7 +199,7 @@ TEST_F(SerialProgramTest, LogsItsEventsOnStderr) {
 
 // The log counts as many events as `mpf msr`, and does not contain the input.
 TEST_F(SerialProgramTest, LogsSurplusInputWithEachAlarm) {
-  const auto server = start({"--quiet-time", "1", "--resync-limit", "60000"});
+  const auto server = start({"--quiet-time", "1ms", "--resync-limit", "1min"});
   Asker asker(backplane_);
   for (int i = 0; i < 3; ++i) {
     // The instrument does not know this question: it says the answer after the timeout.
@@ -223,7 +223,7 @@ TEST_F(SerialProgramTest, LogsSurplusInputWithEachAlarm) {
 TEST_F(SerialProgramTest, RefusesInvalidLimits) {
   for (const auto& [option, value] :
        std::vector<std::array<std::string, 2>>{{"--settle-time", "-1"},
-                                               {"--quiet-time", "9999999999"},
+                                               {"--quiet-time", "3601"},
                                                {"--resync-limit", "soon"},
                                                {"--max-timeout", "0"},
                                                {"--max-retries", "-1"}}) {

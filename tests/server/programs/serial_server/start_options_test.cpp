@@ -78,9 +78,9 @@ TEST(SerialStartOptions, TheEndOfAMessageMayBeEmpty) {
 
 TEST(SerialStartOptions, LimitsApplyToAllServers) {
   SerialStartOptions options;
-  ASSERT_EQ(
-      parseSerial(options, {"a", "/dev/ttyS0", "--server", "b,/dev/ttyS1", "--quiet-time", "250"}),
-      std::nullopt);
+  ASSERT_EQ(parseSerial(options,
+                        {"a", "/dev/ttyS0", "--server", "b,/dev/ttyS1", "--quiet-time", "250ms"}),
+            std::nullopt);
 
   for (const auto& start : options.servers) EXPECT_EQ(start.serial.limits.quietTime, 250ms);
 }
