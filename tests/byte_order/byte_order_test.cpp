@@ -171,8 +171,8 @@ TEST_P(ForeignWindow, IsRefusedByName) {
   const auto client =
       other.start("mpf_test_ask", {other.backplane(), Host::kServer, Host::kLocation, "why"});
 
-  EXPECT_THAT(second->line(), HasSubstr("foreign magic"));
-  EXPECT_THAT(client->line(), HasSubstr("foreign magic"));
+  EXPECT_THAT(second->line(), HasSubstr("wrong magic number"));
+  EXPECT_THAT(client->line(), HasSubstr("wrong magic number"));
   const auto asker = one.startAsker();
   EXPECT_EQ(asker->line(), "connectYes");
   EXPECT_THAT(lines(*asker, right.size()), ElementsAreArray(right));

@@ -111,9 +111,9 @@ const Foreign kForeigners[] = {
        writeWindow(path, [](layout::SegmentHeader&) {}, layout::kWindowBytes - 1);
      }},
     {"Empty", "truncated", [](const std::string& path) { writeFile(path, "", 0); }},
-    {"Directory", "no regular file",
+    {"Directory", "not a regular file",
      [](const std::string& path) { std::filesystem::create_directory(path); }},
-    {"Fifo", "no regular file",
+    {"Fifo", "not a regular file",
      [](const std::string& path) { checkCall(::mkfifo(path.c_str(), 0600), "mkfifo", path); }},
     {"SymbolicLink", "Too many levels of symbolic links",
      [](const std::string& path) { std::filesystem::create_symlink("/dev/null", path); }},

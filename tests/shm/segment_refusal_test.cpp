@@ -43,13 +43,13 @@ TEST_F(SegmentRefusal, AcceptsAGoodSegment) { EXPECT_EQ(refusal(), ""); }
 TEST_F(SegmentRefusal, NamesAForeignFile) {
   header().magic ^= 1;
 
-  EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("foreign magic")));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("wrong magic number")));
 }
 
 TEST_F(SegmentRefusal, NamesASegmentOfTheOtherByteOrder) {
   header().magic = __builtin_bswap64(header().magic);
 
-  EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("foreign magic")));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("wrong magic number")));
 }
 
 TEST_F(SegmentRefusal, NamesBothVersions) {

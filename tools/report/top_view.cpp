@@ -270,11 +270,11 @@ std::string TopView::counts() const {
       return delta_->stateOf(router, line) != "connected";
     }));
   }
-  auto text = cut == 0 ? std::string()
-                       : fmt::format("{} of {} cut, ", cut, counted(lines, "router connection"));
+  auto text =
+      cut == 0 ? std::string() : fmt::format("{} of {} cut, ", cut, counted(lines, "connection"));
   text += fmt::format("{}, {}, {}, {:.0f} requests/s", counted(snapshot.servers.size(), "server"),
                       counted(snapshot.clients.size(), "client"), counted(links, "link"), requests);
-  if (lines != 0 && cut == 0) text += ", " + counted(lines, "router connection");
+  if (lines != 0 && cut == 0) text += ", " + counted(lines, "connection");
   if (!snapshot.problems.empty())
     text += fmt::format(", {} (mpf ls)", counted(snapshot.problems.size(), "problem"));
   return text;

@@ -67,11 +67,11 @@ class Running:
         if self._process.returncode not in (0, -signal.SIGTERM):
             raise Error(program.error_of(self._process))
 
-    def _await(self, stream: IO[str] | None, begin: str) -> None:
-        """Waits for the first line of its stdout or stderr, which begins so unless it fails."""
+    def _await(self, stream: IO[str] | None, pattern: str) -> None:
+        """Waits for the first line of its stdout or stderr, which matches unless it fails."""
         assert stream is not None
         line = stream.readline()
-        if not line.startswith(begin):
+        if not re.match(pattern, line):
             raise Error((line + program.error_of(self._process)).strip())
 
 
@@ -138,7 +138,7 @@ def record(
     """
     options = ["--write", os.fspath(file), *_backplane(backplane), *_at(location)]
     recording = Recording(["tap", server, "0", *options])
-    recording._await(recording._process.stderr, "mpf tap: ")
+    recording._await(recording._process.stderr, r"mpf tap: .*( now|; waiting for it)$")
     return recording
 
 
@@ -178,7 +178,7 @@ def replay(
     options = ["--server", server] if server else []
     options += ["--speed", str(speed), "--json", *_backplane(backplane), *_at(location)]
     ghost = Ghost(["replay", os.fspath(file), "--as-server", *options])
-    ghost._await(ghost._process.stdout, "{")
+    ghost._await(ghost._process.stdout, r"\{")
     return ghost
 
 

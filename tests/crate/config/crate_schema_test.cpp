@@ -44,7 +44,8 @@ TEST_F(CrateSchemaTest, AcceptsTheTimesOfACrate) {
   const std::regex time(keys["stop-time"]["pattern"].get<std::string>());
   for (const std::string text : {"500ms", "2s", "10min", "1.5min", "0.25s", "", "5", "0s", "0.0s",
                                  "1h", "1 s", "-1s", "off"}) {
-    const auto errors = errorsOf("[supervision]\nstop-time = \"" + text + "\"\n");
+    const auto errors =
+        errorsOf("[supervision]\nstop-time = \"" + text + "\"\n[[server]]\nprogram = \"int32\"\n");
     EXPECT_EQ(std::regex_search(text, time), errors.empty()) << text << errors;
   }
   const std::regex timeOrOff(keys["stall-limit"]["pattern"].get<std::string>());

@@ -84,7 +84,7 @@ TEST_F(TopTest, ShowsConnectionsToOtherHosts) {
   const auto top = this->top({"--routers"});
 
   ASSERT_TRUE(top->waitFor("→ 10.0.0.8:9900")) << top->screen();
-  EXPECT_THAT(top->row(0), testing::HasSubstr("1 of 2 router connections cut"));
+  EXPECT_THAT(top->row(0), testing::HasSubstr("1 of 2 connections cut"));
   EXPECT_TRUE(top->look(2).isRed);
   EXPECT_FALSE(top->look(3).isRed);
   top->type("j\r");

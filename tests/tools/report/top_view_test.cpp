@@ -188,7 +188,7 @@ TEST_F(TopViewTest, ShowsConnectionsToOtherHosts) {
   press({kTopTab, kTopTab});
 
   const auto lines = view_.lines(24);
-  EXPECT_THAT(lines.at(0).text, HasSubstr(": 1 of 2 router connections cut, 0 servers"));
+  EXPECT_THAT(lines.at(0).text, HasSubstr(": 1 of 2 connections cut, 0 servers"));
   EXPECT_THAT(
       lines.at(1).text,
       testing::MatchesRegex("ROUTER\\* +STATE +CONN +QUEUED +SENT/s +RECV/s +WRITES/s +RTT"));
