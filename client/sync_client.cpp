@@ -1,23 +1,27 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/sync_client.h>
 
+#include <fmt/format.h>
+
+#include "base/duration_text.h"
+
 namespace mpf {
 namespace {
 
 // After so many steps the dispatcher has looked at deadlines, however many replies wait.
 constexpr int kStepsToDeadlines = 64;
 
-std::string limitExceeded(const Message& message, std::uint64_t maxBytes) {
-  return ": " + std::to_string(message.body().size()) + " bytes, the limit is " +
-         std::to_string(maxBytes);
-}
-
 }  // namespace
 
 std::string Answer::why() const {
-  if (fate_) return std::string("no reply: ") + std::string(toString(*fate_));
-  if (refusal_) return std::string("not sent: ") + toString(*refusal_) + details_;
-  return {};
+  if (fate_)
+    return fmt::format("no reply{}: {} ({})", details_, toString(*fate_), meaningOf(*fate_));
+  if (refusal_) return fmt::format("not sent: {}{}", toString(*refusal_), details_);
+  if (!reply_ || expected_ == MessageType::none) return {};
+  if (reply_.getType() == expected_)
+    return fmt::format("the reply is no valid {} message", toString(expected_));
+  return fmt::format("the reply is of type {}, not {}", toString(reply_.getType()),
+                     toString(expected_));
 }
 
 SyncClient::SyncClient(const Backplane& backplane, const std::string& server, std::int32_t location,
@@ -65,12 +69,9 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout, Retry retry) {
   const auto deadline = Deadline::after(timeout);
   answer_.reset();
   awaited_ = 0;
-  if (const auto result = send(std::move(message), deadline, retry); result != SendResult::sent) {
+  if (const auto result = send(std::move(message), deadline, retry); result != SendResult::sent)
     // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
-    if (result == SendResult::tooLarge)
-      return Answer(result, limitExceeded(message, client_.maxMessageBytes()));
-    return Answer(result);
-  }
+    return Answer(result, detailsOf(result, message));
   while (!answer_ && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
   if (!answer_) {
     // Delivers `expired` if the server has not received the request. Otherwise the server may still
@@ -79,13 +80,25 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout, Retry retry) {
       if (!dispatcher_.runOnce(Deadline::atNs(0))) break;
     if (!answer_) {
       client_.cancel(awaited_);
-      answer_.emplace(Fate::outcomeUnknown);
+      const auto waitedNs = static_cast<double>(timeout.count());
+      answer_.emplace(Fate::outcomeUnknown, " within " + durationText(waitedNs));
     }
   }
   awaited_ = 0;
   auto answer = std::move(*answer_);
   answer_.reset();
   return answer;
+}
+
+// What why() says beside the refusal.
+std::string SyncClient::detailsOf(SendResult refusal, const Message& notSent) const {
+  if (refusal == SendResult::tooLarge)
+    return fmt::format(": {} bytes, the limit is {}", notSent.body().size(),
+                       client_.maxMessageBytes());
+  if (refusal != SendResult::notConnected) return {};
+  if (client_.isInherited()) return ": the client was made before a fork; make one in this process";
+  const auto because = client_.notConnectedBecause();
+  return because.empty() ? "" : ": " + because;
 }
 
 Message SyncClient::receive(Nanoseconds timeout) {

@@ -89,6 +89,12 @@ enum class Fate : std::int32_t {
 // Indexed by the value of the fate.
 inline constexpr std::array<std::string_view, 5> kFateNames{
     "refused", "neverTaken", "outcomeUnknown", "expired", "cancelled"};
+inline constexpr std::array<std::string_view, 5> kFateMeanings{
+    "the server did not accept the request, or dropped it without a reply",
+    "the server ended before it took the request: nothing was done",
+    "the server may have taken the request and carried it out",
+    "the server did not take the request in time: nothing was done",
+    "the client cancelled the request"};
 
 // ---- the description of a type: each T has kType, kName and fields(), and arrays have Element
 
@@ -341,6 +347,11 @@ concept CountedInElements = ArrayBody<T> && !CountedInBytes<T>;
 [[nodiscard]] constexpr std::string_view toString(Fate fate) noexcept {
   const auto at = static_cast<std::size_t>(fate);
   return at < kFateNames.size() ? kFateNames[at] : "unknown";
+}
+// What the fate says about the request, for people.
+[[nodiscard]] constexpr std::string_view meaningOf(Fate fate) noexcept {
+  const auto at = static_cast<std::size_t>(fate);
+  return at < kFateMeanings.size() ? kFateMeanings[at] : "unknown";
 }
 
 }  // namespace mpf

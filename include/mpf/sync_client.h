@@ -27,10 +27,11 @@ namespace mpf {
 class Answer {
  public:
   explicit Answer(Message reply) noexcept : reply_(std::move(reply)) {}
-  // `details` is appended to the words for the refusal in why().
+  // `details` follow the words "not sent: REFUSAL" or "no reply" in why().
   explicit Answer(SendResult refusal, std::string details = {}) noexcept
       : refusal_(refusal), details_(std::move(details)) {}
-  explicit Answer(Fate fate) noexcept : fate_(fate) {}
+  explicit Answer(Fate fate, std::string details = {}) noexcept
+      : fate_(fate), details_(std::move(details)) {}
 
   // True when there is a reply.
   explicit operator bool() const noexcept { return static_cast<bool>(reply_); }
@@ -40,13 +41,16 @@ class Answer {
   // is not T.
   template <MessageBody T>
   [[nodiscard]] std::optional<MessageOf<T>> as() {
-    return MessageOf<T>::tryFrom(std::move(reply_));
+    auto typed = MessageOf<T>::tryFrom(std::move(reply_));
+    if (!typed) expected_ = T::kType;
+    return typed;
   }
   // How a request that was sent ended without a reply.
   [[nodiscard]] std::optional<Fate> fate() const noexcept { return fate_; }
   // Why a request was not sent.
   [[nodiscard]] std::optional<SendResult> refusal() const noexcept { return refusal_; }
-  // The fate or the refusal in words; empty when there is a reply.
+  // Why there is no reply; after as() has returned nullopt, why the reply has another type.
+  // Otherwise empty.
   [[nodiscard]] std::string why() const;
 
  private:
@@ -54,6 +58,7 @@ class Answer {
   std::optional<Fate> fate_;
   std::optional<SendResult> refusal_;
   std::string details_;
+  MessageType expected_ = MessageType::none;  // that the reply has not
 };
 
 class SyncClient {
@@ -86,6 +91,7 @@ class SyncClient {
  private:
   SendResult send(Message&& message, Deadline deadline, Retry retry);
   void take(Message&& message);
+  [[nodiscard]] std::string detailsOf(SendResult refusal, const Message& notSent) const;
   Dispatcher dispatcher_;
   MessageClient client_;
   std::uint32_t awaited_ = 0;

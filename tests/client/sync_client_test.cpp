@@ -64,6 +64,7 @@ TEST(SyncClientTest, ReportsWhyThereIsNoReply) {
   SyncClient client(backplane, "echo");
   auto none = client.call(Int32Message(), 1ms);
   EXPECT_EQ(none.refusal(), SendResult::notConnected);
+  EXPECT_EQ(none.why(), "not sent: not connected: server \"echo\" at location 0 is not running");
 
   MessageServer server(backplane, "echo");
   Message held;
@@ -81,7 +82,21 @@ TEST(SyncClientTest, ReportsWhyThereIsNoReply) {
 
   EXPECT_EQ(unknown.fate(), Fate::outcomeUnknown);
   EXPECT_EQ(expired.fate(), Fate::expired);
-  EXPECT_EQ(expired.why(), "no reply: expired");
+  EXPECT_THAT(unknown.why(), testing::StartsWith("no reply within "));
+  EXPECT_EQ(expired.why(),
+            "no reply: expired (the server did not take the request in time: nothing was done)");
+}
+
+TEST(SyncClientTest, SaysThatTheReplyIsOfAnotherType) {
+  const Watchdog watchdog("sync client");
+  Answer answer(Float64Message({.value = 1}));
+  EXPECT_EQ(answer.why(), "");
+
+  EXPECT_FALSE(answer.as<Int32>());
+
+  EXPECT_EQ(answer.why(), "the reply is of type float64, not int32");
+  EXPECT_TRUE(answer.as<Float64>());
+  EXPECT_EQ(answer.why(), "");
 }
 
 // Servers that end and are replaced while clients call: each request is executed exactly once.

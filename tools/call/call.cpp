@@ -56,25 +56,6 @@ std::string typesForCalls() {
   return names;
 }
 
-// What the fate of a request means for its sender.
-std::string meaning(Fate fate, MessageType type) {
-  switch (fate) {
-    case Fate::refused:
-      return fmt::format(
-          "the server does not accept {} messages, or dropped this one without a reply",
-          toString(type));
-    case Fate::neverTaken:
-      return "the server ended before it took the request: nothing was done";
-    case Fate::outcomeUnknown:
-      return "no reply arrived; the server may have taken the request and carried it out";
-    case Fate::expired:
-      return "the server did not take the request in time: nothing was done";
-    case Fate::cancelled:
-      return "the client cancelled the request";
-  }
-  return "unknown fate";
-}
-
 class Caller {
  public:
   Caller(const CallArguments& arguments, MessageType type)
@@ -132,12 +113,9 @@ class Caller {
     }
   }
 
-  std::string whyNot(const Answer& answer) {
-    if (const auto fate = answer.fate())
-      return fmt::format("{} ({})", answer.why(), meaning(*fate, type_));
-    const auto because = client_.client().notConnectedBecause();
-    return answer.why() +
-           (because.empty() ? "" : fmt::format(": {}; `mpf ls` shows all servers", because));
+  static std::string whyNot(const Answer& answer) {
+    const bool isConnected = answer.refusal() != SendResult::notConnected;
+    return answer.why() + (isConnected ? "" : "; `mpf ls` shows all servers");
   }
 
   void show(const Message& message) {
