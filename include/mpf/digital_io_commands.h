@@ -25,9 +25,11 @@
 //
 // When the module works again, the server has restored its outputs and its threshold. The
 // messages of a monitor are further replies to the request cmdStartMonitor. A client has at most
-// one monitor: another cmdStartMonitor replaces it. Any number of clients may have monitors. A
-// client that does not receive its messages loses its monitor when a reply cannot be delivered; no
-// other client is affected.
+// one monitor: another cmdStartMonitor replaces it. Any number of clients may have monitors.
+//
+// When a client does not receive its messages and its queue is full, its further changes are merged
+// into one message: all bits that changed since the last message, and the last inputs and status.
+// The client gets it when it receives again; no other client is affected.
 //
 // Source  the numbers and meanings of cmdSetBits to cmdSetDAC are those of the original MPF; the
 //         other commands are additions.

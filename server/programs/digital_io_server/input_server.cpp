@@ -2,6 +2,7 @@
 #include "server/programs/digital_io_server/input_server.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "server/programs/hardware/bits_request.h"
@@ -11,6 +12,7 @@ namespace mpf {
 namespace {
 
 constexpr std::size_t kMaxQueuedChanges = 1000;
+constexpr std::chrono::milliseconds kSendAgainAfter{20};
 
 }  // namespace
 
@@ -36,7 +38,7 @@ DigitalInputServer::~DigitalInputServer() {
 
 void DigitalInputServer::run() {
   while (!ends_.load(std::memory_order_relaxed)) {
-    static_cast<void>(server_.waitForMessage());
+    static_cast<void>(server_.waitForMessage(sendAgainAt_));
     deliver();
     // deliver() after each request: a client that sends many requests must not delay monitors.
     while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) deliver();
@@ -118,6 +120,7 @@ void DigitalInputServer::enqueue(const DigitalIoChange& change) {
 }
 
 void DigitalInputServer::deliver() {
+  sendAgain();
   std::deque<DigitalIoChange> all;
   {
     const std::lock_guard lock(mutex_);
@@ -158,20 +161,38 @@ void DigitalInputServer::note(const DigitalIoChange& change) {
   server_.countAlarm();
 }
 
-// Returns false when the message could not be sent.
 bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
                               bool isThere) {
+  if (monitor.unsent) changed |= static_cast<std::uint32_t>(monitor.unsent->address);
+  return trySend(monitor, {.cmd = digital::cmdStartMonitor,
+                           .status = isThere ? 0 : -1,
+                           .address = static_cast<std::int32_t>(changed),
+                           .value = static_cast<std::int32_t>(inputs)});
+}
+
+bool DigitalInputServer::trySend(Monitor& monitor, const Int32& fields) {
   auto message = server_.allocReplyMessage<Int32>(monitor.request);
-  *message = {.cmd = digital::cmdStartMonitor,
-              .status = isThere ? 0 : -1,
-              .address = static_cast<std::int32_t>(changed),
-              .value = static_cast<std::int32_t>(inputs)};
+  *message = fields;
   const auto result = server_.reply(std::move(message));
-  if (result == ReplyResult::sent) return true;
-  if (result != ReplyResult::clientGone)
-    log_->warn("a client does not receive its messages and loses its monitor: {}",
-               toString(result));
-  return false;
+  if (result == ReplyResult::sent) {
+    monitor.unsent.reset();
+  } else if (result != ReplyResult::clientGone) {
+    if (!monitor.unsent)
+      log_->warn("a client does not receive its messages: changes are merged until it does ({})",
+                 toString(result));
+    monitor.unsent = fields;
+    sendAgainAt_ = std::min(sendAgainAt_, Deadline::after(kSendAgainAfter));
+  }
+  return result != ReplyResult::clientGone;
+}
+
+void DigitalInputServer::sendAgain() {
+  if (!sendAgainAt_.hasPassed()) return;
+  sendAgainAt_ = Deadline::never();
+  std::erase_if(monitors_, [this](Monitor& monitor) {
+    return monitor.unsent && !trySend(monitor, Int32(*monitor.unsent));
+  });
+  followCount();
 }
 
 std::vector<DigitalInputServer::Monitor>::iterator DigitalInputServer::find(std::uint64_t client) {

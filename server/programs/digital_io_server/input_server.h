@@ -7,17 +7,20 @@
 // Threads  its own thread waits for requests and changes, and never for a client. It sends changes
 //          before it receives the next request.
 // Crash    the monitor of a client that dies is removed when the server notices its death.
-// Trust    a client that does not receive its messages loses its monitor. When too many changes of
-//          the inputs are queued, further ones are merged into the last.
+// Trust    the changes for a client that does not receive its messages are merged into one, which
+//          is sent again until the client has room for it. When too many changes of the inputs are
+//          queued, further ones are merged into the last.
 #pragma once
 
 #include <atomic>
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <mpf/clock.h>
 #include <mpf/digital_io_commands.h>
 #include <mpf/message_server.h>
 
@@ -51,6 +54,7 @@ class DigitalInputServer {
     Int32Message request;  // cmdStartMonitor; the changes are further replies to it
     std::uint64_t client = 0;
     std::uint32_t mask = 0;
+    std::optional<Int32> unsent = {};  // the client had no room for it; later changes are merged in
   };
 
   void run();
@@ -62,8 +66,11 @@ class DigitalInputServer {
   void enqueue(const DigitalIoChange& change);
   void deliver();
   void note(const DigitalIoChange& change);
+  // Return false when the client is gone.
   [[nodiscard]] bool send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
                           bool isThere);
+  [[nodiscard]] bool trySend(Monitor& monitor, const Int32& fields);
+  void sendAgain();
   [[nodiscard]] std::vector<Monitor>::iterator find(std::uint64_t client);
   void forgetGone();
   void followCount();
@@ -73,6 +80,7 @@ class DigitalInputServer {
   MessageServer server_;
   FaultNote faults_;  // of reads; used by the server's thread, as monitors_
   std::vector<Monitor> monitors_;
+  Deadline sendAgainAt_ = Deadline::never();  // never when all messages were sent
   std::mutex mutex_;
   std::deque<DigitalIoChange> changes_;  // under mutex_
   std::atomic<std::size_t> count_{0};
