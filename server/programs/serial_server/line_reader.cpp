@@ -104,12 +104,15 @@ LineReader::Answer LineReader::takeAnswer() {
 // ---- the port's thread
 
 std::size_t LineReader::completeBytes() const {
-  if (maxBytes_ != 0 && input_.size() >= maxBytes_) {
-    const auto end = eom_.empty() ? std::string::npos : input_.substr(0, maxBytes_).find(eom_);
-    return end == std::string::npos ? maxBytes_ : end + eom_.size();
-  }
-  const auto end = eom_.empty() ? std::string::npos : input_.find(eom_);
-  return end == std::string::npos ? 0 : end + eom_.size();
+  const bool isLimited = maxBytes_ != 0 && input_.size() >= maxBytes_;
+  const auto bytes = input_.first(isLimited ? maxBytes_ : input_.size());
+  const auto end = eom_.empty() ? std::string::npos : bytes.find(eom_);
+  if (end != std::string::npos) return end + eom_.size();
+  return isLimited ? maxBytes_ : 0;
+}
+
+bool LineReader::endsAnswer() const {
+  return (!eom_.empty() && input_.endsWith(eom_)) || (maxBytes_ != 0 && input_.size() >= maxBytes_);
 }
 
 ByteHandlerResult LineReader::byteReceived(std::uint8_t byte) {
@@ -149,10 +152,10 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
       dropLateAnswer();
       return ByteHandlerResult::ok;
     }
-    input_.erase(0, 1);  // circular buffer: drop the oldest byte
+    input_.eraseFirst(1);  // circular buffer: drop the oldest byte
   }
   input_.push_back(static_cast<char>(byte));
-  return isRead && completeBytes() != 0 ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+  return isRead && endsAnswer() ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
 }
 
 void LineReader::noteSurplus() {
@@ -192,10 +195,10 @@ void LineReader::readEnds(SerialPortStatus status) {
   const auto complete = completeBytes();
   auto bytes = complete != 0 ? complete : input_.size();
   if (answer_.overflow) bytes = std::min(bytes, bufferBytes_);
-  answer_.bytes = input_.substr(0, bytes);
+  answer_.bytes = input_.first(bytes);
   answer_.faults = static_cast<std::uint8_t>(answer_.faults | input_.faultsOfFirst(bytes));
   if (!wasSent) {
-    input_.erase(0, bytes);
+    input_.eraseFirst(bytes);
     return;
   }
   if (complete != 0 && status == SerialPortStatus::success && answer_.faults == 0) {
@@ -207,7 +210,7 @@ void LineReader::readEnds(SerialPortStatus status) {
   if (mayBeLate_ && status == SerialPortStatus::timeout && (!eom_.empty() || maxBytes_ != 0)) {
     phase_ = Phase::collectingLate;
   } else {
-    input_.erase(0, bytes);
+    input_.eraseFirst(bytes);
   }
 }
 

@@ -91,6 +91,8 @@ class LineReader final : public ByteHandler {
   };
   // [bytes] Length of the first complete answer in the input; 0 when no answer is complete.
   [[nodiscard]] std::size_t completeBytes() const;
+  // Whether the last byte of the input completes an answer, when no answer was complete before.
+  [[nodiscard]] bool endsAnswer() const;
   ByteHandlerResult collect(std::uint8_t byte);
   void noteSurplus();
   void dropLateAnswer();

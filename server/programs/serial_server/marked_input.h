@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,29 +19,30 @@ namespace mpf {
 
 class MarkedInput {
  public:
-  [[nodiscard]] std::size_t size() const noexcept { return bytes_.size(); }
-  [[nodiscard]] bool empty() const noexcept { return bytes_.empty(); }
-  [[nodiscard]] bool endsWith(const std::string& end) const { return bytes_.ends_with(end); }
-  [[nodiscard]] std::size_t find(const std::string& text) const { return bytes_.find(text); }
-  [[nodiscard]] std::string substr(std::size_t from, std::size_t count) const {
-    return bytes_.substr(from, count);
-  }
+  [[nodiscard]] std::size_t size() const noexcept { return bytes_.size() - start_; }
+  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+  [[nodiscard]] bool endsWith(std::string_view end) const { return all().ends_with(end); }
+  [[nodiscard]] std::size_t find(std::string_view text) const { return all().find(text); }
+  [[nodiscard]] std::string_view first(std::size_t count) const { return all().substr(0, count); }
 
   void push_back(char byte) {  // NOLINT(readability-identifier-naming): as std::string has it
     bytes_.push_back(byte);
     marks_.push_back(std::exchange(nextMark_, std::uint8_t{0}));
   }
-  // Removes bytes with their marks; a mark after the last byte stays.
-  void erase(std::size_t from, std::size_t count) {
-    bytes_.erase(from, count);
-    const auto first = marks_.begin() + static_cast<std::ptrdiff_t>(from);
-    marks_.erase(
-        first, marks_.begin() + static_cast<std::ptrdiff_t>(std::min(from + count, marks_.size())));
+  // Removes the first bytes with their marks; a mark after the last byte stays. Moves the other
+  // bytes only when they are fewer than those that were removed: the cost does not depend on them.
+  void eraseFirst(std::size_t count) {
+    start_ += std::min(count, size());
+    if (start_ < size()) return;
+    bytes_.erase(0, start_);
+    marks_.erase(marks_.begin(), marks_.begin() + static_cast<std::ptrdiff_t>(start_));
+    start_ = 0;
   }
   // Removes all bytes and all marks.
   void clear() noexcept {
     bytes_.clear();
     marks_.clear();
+    start_ = 0;
     nextMark_ = 0;
   }
 
@@ -52,14 +54,16 @@ class MarkedInput {
   // The faults of all marks before the first `count` bytes.
   [[nodiscard]] std::uint8_t faultsOfFirst(std::size_t count) const {
     std::uint8_t faults = 0;
-    for (std::size_t i = 0; i < std::min(count, marks_.size()); ++i)
-      faults = static_cast<std::uint8_t>(faults | marks_[i]);
+    for (std::size_t i = 0; i < std::min(count, size()); ++i)
+      faults = static_cast<std::uint8_t>(faults | marks_[start_ + i]);
     return faults;
   }
 
  private:
-  std::string bytes_;
+  [[nodiscard]] std::string_view all() const { return std::string_view(bytes_).substr(start_); }
+  std::string bytes_;  // those before start_ have been removed
   std::vector<std::uint8_t> marks_;  // one for each byte
+  std::size_t start_ = 0;
   std::uint8_t nextMark_ = 0;
 };
 
