@@ -4,12 +4,14 @@
 //   request   cmd = command | options, value = bytes to write
 //             timeout [s], or [ms] with cmdTimeoutMilliseconds: longest wait for the line
 //             extra > 0: read at most `extra` bytes
-//             numberRetrys: how often a request that failed is repeated
+//             numberRetrys: how often a request that failed is repeated; a read is repeated only
+//             after a timeout, and keeps the bytes of its earlier attempts
 //             eomLen, eomString: the new end of message, with cmdSetEom
 //   reply     status = serialServerStatus..., value = bytes that were read, extra = serialFault...
 //
 // When a server exits, it replies to the request in progress with serialServerStatusError. Requests
-// that it has not taken end as `neverTaken`, and none of their bytes were sent.
+// that it has not taken end as `neverTaken`, and none of their bytes were sent. A request whose
+// cmd has no command or an unknown option gets serialServerStatusError and has no effect.
 // <mpf/serial_sniff.h> describes how to listen to the line.
 //
 // Source   manual, "serialServer". The numbers are those of this project: no public source gives

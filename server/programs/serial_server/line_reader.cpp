@@ -35,10 +35,11 @@ void LineReader::setCircular(bool circular) {
 
 // ---- the server's thread
 
-void LineReader::prepareRead(bool flush, std::size_t maxBytes) {
+void LineReader::prepareRead(bool flush, std::size_t maxBytes, bool mayBeLate) {
   const std::lock_guard lock(mutex_);
   dropLateAnswer();
   isQuestion_ = false;
+  mayBeLate_ = mayBeLate;
   flush_ = flush;
   maxBytes_ = maxBytes;
   answer_ = {};
@@ -53,10 +54,10 @@ void LineReader::prepareQuestion(std::size_t maxBytes, bool mayBeLate) {
   answer_ = {};
 }
 
-bool LineReader::tryContinue() {
+bool LineReader::tryContinue(bool mayBeLate) {
   const std::lock_guard lock(mutex_);
   continues_ = phase_ == Phase::collectingLate;
-  mayBeLate_ = false;
+  mayBeLate_ = mayBeLate;
   if (continues_) answer_ = {};
   return continues_;
 }
@@ -87,12 +88,14 @@ void LineReader::noteWritten() {
   sync_.written(Clock::nowNs());
 }
 
-// The reply with status "timeout" contained the bytes that had been received until then.
+// The reply with status "timeout" contained the bytes that had been received until then. Those that
+// followed belong to the answer of a write-read, but to the circular buffer after a read.
 void LineReader::dropLateAnswer() {
   continues_ = false;
   if (phase_ != Phase::collectingLate) return;
   phase_ = Phase::idle;
-  input_.clear();
+  if (isQuestion_) input_.clear();
+  else input_.eraseFirst(returnedBytes_);
 }
 
 LineReader::Answer LineReader::takeAnswer() {
@@ -150,7 +153,7 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
     }
     if (phase_ == Phase::collectingLate) {
       dropLateAnswer();
-      return ByteHandlerResult::ok;
+      return circular_ ? collect(byte) : ByteHandlerResult::ok;
     }
     input_.eraseFirst(1);  // circular buffer: drop the oldest byte
   }
@@ -197,18 +200,18 @@ void LineReader::readEnds(SerialPortStatus status) {
   if (answer_.overflow) bytes = std::min(bytes, bufferBytes_);
   answer_.bytes = input_.first(bytes);
   answer_.faults = static_cast<std::uint8_t>(answer_.faults | input_.faultsOfFirst(bytes));
-  if (!wasSent) {
-    input_.eraseFirst(bytes);
-    return;
-  }
-  if (complete != 0 && status == SerialPortStatus::success && answer_.faults == 0) {
+  if (wasSent && complete != 0 && status == SerialPortStatus::success && answer_.faults == 0) {
     sync_.answered();
-  } else {
+  } else if (wasSent) {
     sync_.unanswered(Clock::nowNs());
   }
-  // An answer whose end cannot be recognised is not collected any further.
-  if (mayBeLate_ && status == SerialPortStatus::timeout && (!eom_.empty() || maxBytes_ != 0)) {
+  // What follows an answer whose end cannot be recognised may be anything; a read without an end
+  // has all bytes until its last attempt ends.
+  const bool hasEnd = !eom_.empty() || maxBytes_ != 0;
+  const bool isKept = isQuestion_ ? wasSent && hasEnd : true;
+  if (mayBeLate_ && status == SerialPortStatus::timeout && isKept) {
     phase_ = Phase::collectingLate;
+    returnedBytes_ = bytes;
   } else {
     input_.eraseFirst(bytes);
   }

@@ -5,7 +5,8 @@
 //   bytes ─► input, at most bufferBytes ─► end of message, `extra` bytes, or overflow ─► answer
 //   lost or damaged bytes ─► a mark in the input ─► the faults of each answer that contains it
 //
-//   read        (cmd 1)   may begin with what was received before it: the circular buffer
+//   read        (cmd 1)   may begin with what was received before it: the circular buffer; its
+//                         retry continues a read that ended with a timeout
 //   write-read  (cmd 3)   getInStep() ─► port.writeRead() ─► takeAnswer()
 //                         nothing that arrived before its first byte was sent is in its answer
 //
@@ -43,16 +44,19 @@ class LineReader final : public ByteHandler {
   void setCircular(bool circular);
 
   // Prepares the next read.
-  //   flush     drop the bytes that were received before
-  //   maxBytes  the answer ends after this number of bytes; 0: no limit
-  void prepareRead(bool flush, std::size_t maxBytes);
+  //   flush      drop the bytes that were received before
+  //   maxBytes   the answer ends after this number of bytes; 0: no limit
+  //   mayBeLate  keep an answer that does not arrive in time, for a read after tryContinue()
+  void prepareRead(bool flush, std::size_t maxBytes, bool mayBeLate);
   // Prepares the next write-read.
   //   maxBytes   the answer ends after this number of bytes; 0: no limit
   //   mayBeLate  keep an answer that does not arrive in time, for a read after tryContinue()
   void prepareQuestion(std::size_t maxBytes, bool mayBeLate);
-  // Makes the next read continue the answer that the last write-read did not get in time. Returns
-  // false when that answer was not kept, or its end cannot be recognised.
-  [[nodiscard]] bool tryContinue();
+  // Makes the next read continue the answer that the last request did not get in time. Returns
+  // false when that answer was not kept; that of a write-read is not if its end cannot be
+  // recognised.
+  //   mayBeLate  keep the answer again
+  [[nodiscard]] bool tryContinue(bool mayBeLate);
 
   enum class Sync {
     inStep,  // the request may be sent now
@@ -112,6 +116,7 @@ class LineReader final : public ByteHandler {
   bool flush_ = false;
   bool isSurplusTold_ = false;
   std::size_t maxBytes_ = 0;
+  std::size_t returnedBytes_ = 0;  // while collecting a late answer: the reply had these
   MarkedInput input_;
   Answer answer_;
 };

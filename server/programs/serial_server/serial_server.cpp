@@ -33,6 +33,22 @@ std::chrono::milliseconds timeoutOf(const Char8Array& request) {
   return std::chrono::seconds(timeout);
 }
 
+constexpr std::int32_t kOptions =
+    cmdFlush | cmdStartCircularBuffer | cmdStopCircularBuffer | cmdSetEom | cmdTimeoutMilliseconds;
+
+// What is wrong with `cmd`; empty when nothing is.
+std::string problemOf(const Char8Array& request) {
+  const auto command = commandOf(request);
+  if (command != cmdRead && command != cmdWrite && command != cmdWriteRead)
+    return fmt::format(
+        "cmd {:#x} has no command: use 1 (read), 2 (write) or 3 (write-read), plus options",
+        request.cmd);
+  const auto unknown = request.cmd & ~(cmdCommandMask | kOptions);
+  if (unknown == 0) return {};
+  return fmt::format("cmd {:#x} has unknown options: {:#x}; the options are {:#x}", request.cmd,
+                     static_cast<std::uint32_t>(unknown), kOptions);
+}
+
 std::int32_t statusOf(SerialPortStatus status) {
   switch (status) {
     case SerialPortStatus::success:
@@ -131,6 +147,19 @@ SerialServer::Work SerialServer::workOf(const Char8ArrayMessage& request) {
 void SerialServer::handle(Char8ArrayMessage&& request) {
   noteRequest();
   auto work = workOf(request);
+  faults_.setAnswer(0);
+  work.problem = problemOf(work.fields);
+  if (work.problem.empty()) perform(request, work);
+  else work.status = serialServerStatusError;
+  if (work.status == serialServerStatusError && !server_.isClientConnected(request)) {
+    log_->info("a client disconnected during its request (cmd {:#x})", work.fields.cmd);
+  } else if (!isStopped_.load(std::memory_order_relaxed)) {
+    noteStatus(work);
+  }
+  reply(request, work);
+}
+
+void SerialServer::perform(const Char8ArrayMessage& request, Work& work) {
   noteLimits(work.fields);
   applyOptions(work.fields);
   writeEnds_ = Deadline::never();
@@ -139,12 +168,6 @@ void SerialServer::handle(Char8ArrayMessage&& request) {
   port_->abandonWhen(work.isAbandoned);
   serve(work);
   port_->abandonWhen({});
-  if (work.status == serialServerStatusError && !server_.isClientConnected(request)) {
-    log_->info("a client disconnected during its request (cmd {:#x})", work.fields.cmd);
-  } else if (!isStopped_.load(std::memory_order_relaxed)) {
-    noteStatus(work);
-  }
-  reply(request, work);
 }
 
 void SerialServer::reply(const Char8ArrayMessage& request, const Work& work) {
@@ -167,13 +190,18 @@ bool SerialServer::isAbandoned(const Char8ArrayMessage& request, bool isWrite) {
 }
 
 void SerialServer::serve(Work& work) {
+  const bool isWriteRead = commandOf(work.fields) == cmdWriteRead && !work.data.empty();
+  const bool isRead = commandOf(work.fields) != cmdWrite && !isWriteRead;
   for (;;) {
     attempt(work);
     if (work.status == serialServerStatusOK || work.retries == 0 || work.isAbandoned()) return;
-    if (work.status == serialServerStatusTimeout && commandOf(work.fields) == cmdWriteRead)
-      takeLateAnswer(work);
+    if (work.status == serialServerStatusTimeout && isWriteRead) takeLateAnswer(work);
     if (work.status == serialServerStatusOK || work.until.hasPassed()) return;
     --work.retries;
+    // A read is repeated only after a timeout: otherwise bytes of its answer are gone, and another
+    // read would return the rest with status 0.
+    work.continues = isRead && reader_.tryContinue(work.retries > 0);
+    if (isRead && !work.continues) return;
   }
 }
 
@@ -181,17 +209,11 @@ void SerialServer::attempt(Work& work) {
   faults_.setAnswer(0);
   switch (commandOf(work.fields)) {
     case cmdRead:
-      return read(work);
+      return read(work, (work.fields.cmd & cmdFlush) != 0);
     case cmdWrite:
       return write(work);
-    case cmdWriteRead:
+    default:
       return ask(work);
-    default:  // options without a command are invalid
-      work.status = serialServerStatusError;
-      work.problem = fmt::format(
-          "cmd {:#x} has no command: use 1 (read), 2 (write) or 3 (write-read), plus options",
-          work.fields.cmd);
-      work.retries = 0;
   }
 }
 
@@ -200,23 +222,28 @@ Deadline SerialServer::deadlineOf(const Work& work) const {
                                   timeoutOf(work.fields), limits_.maxTimeout)));
 }
 
-void SerialServer::read(Work& work) {
-  reader_.prepareRead((work.fields.cmd & cmdFlush) != 0, maxBytesOf(work.fields));
+void SerialServer::read(Work& work, bool flush) {
+  if (!work.continues) reader_.prepareRead(flush, maxBytesOf(work.fields), work.retries > 0);
   takeAnswer(work, port_->read(deadlineOf(work)));
 }
 
 void SerialServer::write(Work& work) {
   if (!isInStep(work, false, Deadline::after(limits_.longestSync()))) return;
+  if ((work.fields.cmd & cmdFlush) != 0) flush();
   work.status = statusOf(port_->write(work.data, deadlineOf(work)));
   reader_.noteWritten();
 }
 
+// The bytes of a read that ends at once: those that the port had not passed on before are included.
+void SerialServer::flush() {
+  reader_.prepareRead(true, 0, false);
+  static_cast<void>(port_->read(Deadline::after({})));
+  static_cast<void>(reader_.takeAnswer());
+}
+
 void SerialServer::ask(Work& work) {
-  if (work.data.empty()) {  // nothing to send: reads the bytes that arrive from now on
-    reader_.prepareRead(true, maxBytesOf(work.fields));
-    takeAnswer(work, port_->read(deadlineOf(work)));
-    return;
-  }
+  // Nothing to send: reads the bytes that arrive from now on.
+  if (work.data.empty()) return read(work, true);
   const auto until = Deadline::after(limits_.longestSync());
   while (isInStep(work, true, until)) {
     reader_.prepareQuestion(maxBytesOf(work.fields), work.retries > 0);
@@ -226,7 +253,7 @@ void SerialServer::ask(Work& work) {
 
 // Reads on after a timeout: an answer that is late for its request can serve as that of the retry.
 void SerialServer::takeLateAnswer(Work& work) {
-  if (!reader_.tryContinue()) return;
+  if (!reader_.tryContinue(false)) return;
   takeAnswer(work, port_->read(std::min(work.until, Deadline::after(limits_.resyncLimit))));
 }
 

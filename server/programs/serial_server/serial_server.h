@@ -55,6 +55,7 @@ class SerialServer {
     std::vector<std::uint8_t> data;
     Deadline until = Deadline::never();  // of all attempts together
     int retries = 0;  // left
+    bool continues = false;  // the next attempt continues a read that ended with a timeout
     std::function<bool()> isAbandoned = {};
     std::int32_t status = 0;  // a serialServerStatus
     std::string answer = {};  // what was read last
@@ -63,6 +64,7 @@ class SerialServer {
 
   void handle(Char8ArrayMessage&& request);
   void configure(SerialConfigMessage&& request);
+  void perform(const Char8ArrayMessage& request, Work& work);
   void reply(const Char8ArrayMessage& request, const Work& work);
   void applyOptions(const Char8Array& request);
   [[nodiscard]] Work workOf(const Char8ArrayMessage& request);
@@ -72,9 +74,10 @@ class SerialServer {
 
   void serve(Work& work);
   void attempt(Work& work);
-  void read(Work& work);
+  void read(Work& work, bool flush);
   void write(Work& work);
   void ask(Work& work);
+  void flush();
   void takeLateAnswer(Work& work);
   // Returns false when nothing was sent, because input arrived immediately before.
   bool takeAnswer(Work& work, SerialPortStatus status);

@@ -27,8 +27,9 @@ class LineReaderTest : public testing::Test {
     return result;
   }
   // Begins a read, as the port does.
-  ByteHandlerResult beginRead(bool flush = false, std::size_t maxBytes = 0) {
-    reader_.prepareRead(flush, maxBytes);
+  ByteHandlerResult beginRead(bool flush = false, std::size_t maxBytes = 0,
+                              bool mayBeLate = false) {
+    reader_.prepareRead(flush, maxBytes, mayBeLate);
     return reader_.readBegins();
   }
   // Begins a write-read and sends its question, as the port does.
@@ -187,7 +188,7 @@ TEST_F(LineReaderTest, ALateAnswerCanBeContinued) {
   EXPECT_EQ(end(SerialPortStatus::timeout).bytes, "A1");
   receive("7\r");
 
-  ASSERT_TRUE(reader_.tryContinue());
+  ASSERT_TRUE(reader_.tryContinue(false));
   EXPECT_EQ(reader_.readBegins(), ByteHandlerResult::endRead);
 
   EXPECT_EQ(end().bytes, "A17\r");
@@ -196,13 +197,13 @@ TEST_F(LineReaderTest, ALateAnswerCanBeContinued) {
 TEST_F(LineReaderTest, ALateAnswerIsNotContinuedWithoutPermissionOrWithoutAnEnd) {
   ask(false);
   end(SerialPortStatus::timeout);
-  EXPECT_FALSE(reader_.tryContinue());
+  EXPECT_FALSE(reader_.tryContinue(false));
 
   reader_.setEom("");
   reader_.prepareQuestion(0, true);
   reader_.sendBegins();
   end(SerialPortStatus::timeout);
-  EXPECT_FALSE(reader_.tryContinue());
+  EXPECT_FALSE(reader_.tryContinue(false));
 }
 
 TEST_F(LineReaderTest, TheNextRequestDropsALateAnswer) {
@@ -214,6 +215,35 @@ TEST_F(LineReaderTest, TheNextRequestDropsALateAnswer) {
   receive("b\r");
 
   EXPECT_EQ(end().bytes, "b\r");
+}
+
+TEST_F(LineReaderTest, AReadThatTimedOutCanBeContinuedRepeatedly) {
+  beginRead(false, 0, true);
+  receive("a");
+  EXPECT_EQ(end(SerialPortStatus::timeout).bytes, "a");
+  receive("b");
+  ASSERT_TRUE(reader_.tryContinue(true));
+  EXPECT_EQ(reader_.readBegins(), ByteHandlerResult::ok);
+  EXPECT_EQ(end(SerialPortStatus::timeout).bytes, "ab");
+  receive("c\rd\r");
+  ASSERT_TRUE(reader_.tryContinue(false));
+
+  EXPECT_EQ(reader_.readBegins(), ByteHandlerResult::endRead);
+
+  EXPECT_EQ(end().bytes, "abc\r");
+  EXPECT_EQ(beginRead(), ByteHandlerResult::endRead);
+  EXPECT_EQ(end().bytes, "d\r");
+}
+
+TEST_F(LineReaderTest, TheNextRequestReadsWhatFollowsAReadThatTimedOut) {
+  beginRead(false, 0, true);
+  receive("abcdef");
+  EXPECT_EQ(end(SerialPortStatus::timeout).bytes, "abcdef");
+  receive("g\r");
+
+  EXPECT_EQ(beginRead(), ByteHandlerResult::endRead);
+
+  EXPECT_EQ(end().bytes, "g\r");
 }
 
 TEST_F(LineReaderTest, AFaultDuringAReadMarksItsAnswer) {

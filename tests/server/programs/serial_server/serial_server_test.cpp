@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A serial server on a real pseudo-terminal with an instrument at its far end, used through shared
 // memory.
+#include <future>
+
 #include <mpf/serial_commands.h>
 
 #include "tests/server/programs/serial_server/serial_fixture.h"
@@ -126,6 +128,58 @@ TEST_F(SerialServerTest, RetriesUntilTheInstrumentAnswers) {
   EXPECT_EQ(reply.text, "late\r\n");
 }
 
+// A read that is repeated until its answer is there.
+class RepeatedReadTest : public SerialServerTest {
+ protected:
+  void read(std::size_t bufferBytes) {
+    start({.bufferBytes = bufferBytes,
+           .eom = "\r\n",
+           .circularBuffer = true,
+           .limits = {.maxTimeout = 24h, .maxRetries = 1'000'000}});
+    reply_ = std::async(std::launch::async, [this] {
+      auto fields = fieldsOf(cmdRead, 20);
+      fields.numberRetrys = 1'000'000;
+      return ask("", fields);
+    });
+    waitForTimeout();
+  }
+  void waitForTimeout() {
+    const auto before = port_.counters().timeouts;
+    while (port_.counters().timeouts == before) std::this_thread::yield();
+  }
+  std::future<SerialReply> reply_;
+};
+
+TEST_F(RepeatedReadTest, ReturnsAnAnswerInPiecesAsAWhole) {
+  read(100);
+  instrument_.say("VOLT=-12");
+  while (port_.counters().bytesIn < 8) std::this_thread::yield();
+  waitForTimeout();
+
+  instrument_.say("3.4\r\n");
+
+  EXPECT_EQ(reply_.get(), (SerialReply{serialServerStatusOK, "VOLT=-123.4\r\n"}));
+}
+
+// The rest with status 0 would look like an answer.
+TEST_F(RepeatedReadTest, DoesNotReturnTheRestOfAnAnswerThatIsTooLong) {
+  read(4);
+
+  instrument_.say("12345\r\n");
+
+  EXPECT_NE(reply_.get().status, serialServerStatusOK);
+}
+
+TEST_F(SerialServerTest, AFlushBeforeAWriteDropsWhatWasReceived) {
+  start();
+  ASSERT_EQ(ask("ECHO old\n", fieldsOf(cmdWrite)).status, serialServerStatusOK);
+  while (port_.counters().bytesIn < 5) std::this_thread::yield();
+
+  ASSERT_EQ(ask("ECHO new\n", fieldsOf(cmdWrite | cmdFlush)).status, serialServerStatusOK);
+
+  EXPECT_EQ(ask("", fieldsOf(cmdRead)).text, "new\r\n");
+}
+
 TEST_F(SerialServerTest, AnUnpluggedLineIsAnErrorAndWorksAgainLater) {
   start();
   instrument_.unplug();
@@ -142,6 +196,18 @@ TEST_F(SerialServerTest, AnInvalidCommandIsAnError) {
   start();
 
   EXPECT_EQ(ask("", fieldsOf(cmdFlush)).status, serialServerStatusError);
+}
+
+TEST_F(SerialServerTest, ARefusedRequestHasNoEffect) {
+  start();
+  for (const auto cmd : {cmdSetEom, cmdSetEom | cmdRead | 0x20000, 0x20000 | cmdRead}) {
+    auto fields = fieldsOf(cmd);
+    fields.eomLen = 1;
+    fields.eomString = {';'};
+    EXPECT_EQ(ask("", fields).status, serialServerStatusError) << cmd;
+  }
+
+  EXPECT_EQ(ask("ECHO a;b\n", fieldsOf(cmdWriteRead)).text, "a;b\r\n");
 }
 
 TEST_F(SerialServerTest, TheReplyToSettingsIsAnInt32) {
