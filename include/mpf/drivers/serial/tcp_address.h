@@ -10,11 +10,11 @@ namespace mpf {
 
 struct TcpAddress {
   std::string host;  // a name or an address, without brackets
-  std::string port;  // a number or the name of a service
+  std::string port;  // a number from 1 to 65535, or the name of a service
 
   // Splits `text` at its last colon. Does not look up the name.
-  //   throws  std::invalid_argument when the host or the port is missing, or an IPv6 address has
-  //           no brackets
+  //   throws  std::invalid_argument when the host or the port is missing or the port is invalid, or
+  //           an IPv6 address has no brackets
   [[nodiscard]] static TcpAddress parse(std::string_view text);
   // The same notation that parse() reads.
   [[nodiscard]] std::string toString() const;
