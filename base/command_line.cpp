@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <limits>
+#include <string_view>
 #include <system_error>
 
 #include "base/number.h"
@@ -60,16 +61,28 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   return kExitUsage;
 }
 
+// Also when no type can hold it.
+bool isWholeNumber(std::string_view text) {
+  if (text.starts_with('-')) text.remove_prefix(1);
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+bool isNumber(std::string_view text) { return tryNumber<double>(text).has_value(); }
+
+//   kind    what a value must be: "a number"
+//   isKind  whether a text is one, in the range or not
 template <class Number>
-CLI::Validator inRange(Number least, Number most) {
+CLI::Validator inRange(Number least, Number most, const char* kind,
+                       bool (*isKind)(std::string_view)) {
   return CLI::Validator(
-      [least, most](const std::string& text) {
+      [=](const std::string& text) {
         const auto value = tryNumber<Number>(text);
         const bool good = value && *value >= least && *value <= most;  // NaN is not
         if (good) return std::string();
+        const auto what = isKind(text) ? "out of range" : fmt::format("not {}", kind);
         if (most == std::numeric_limits<Number>::max())
-          return fmt::format("{} is out of range: use {} or more", text, least);
-        return fmt::format("{} is out of range: use {} to {}", text, least, most);
+          return fmt::format("{} is {}: use {} or more", text, what, least);
+        return fmt::format("{} is {}: use {} to {}", text, what, least, most);
       },
       {});
 }
@@ -91,8 +104,12 @@ int refuseArguments(const std::string& program, const std::string& why) {
   return kExitUsage;
 }
 
-CLI::Validator wholeNumber(std::uint64_t least, std::uint64_t most) { return inRange(least, most); }
-CLI::Validator number(double least, double most) { return inRange(least, most); }
+CLI::Validator wholeNumber(std::uint64_t least, std::uint64_t most) {
+  return inRange(least, most, "a whole number", isWholeNumber);
+}
+CLI::Validator number(double least, double most) {
+  return inRange(least, most, "a number", isNumber);
+}
 
 CLI::Option* addTime(CLI::App& app, const std::string& name, Nanoseconds present,
                      const std::string& help, TimeRange range,

@@ -34,8 +34,8 @@ namespace mpf {
 // Returns the exit status, 2.
 int refuseArguments(const std::string& program, const std::string& why);
 
-// Validators of an option's value. Their message: "0 is out of range: use 1 to 1000", or
-// "0 is out of range: use 1 or more".
+// Validators of an option's value. Their message: "0 is out of range: use 1 to 1000", "0 is out of
+// range: use 1 or more", or "abc is not a whole number: use 1 to 1000".
 [[nodiscard]] CLI::Validator wholeNumber(std::uint64_t least,
                                          std::uint64_t most = ~std::uint64_t{0});
 [[nodiscard]] CLI::Validator number(double least, double most);

@@ -106,14 +106,14 @@ TEST_F(CommandLine, ReportsInvalidArgumentsOnStderrWithStatus2) {
   const std::vector<std::pair<std::vector<const char*>, std::string>> wrong{
       {{"--count", "0"}, "--count: 0 is out of range: use 1 to 10"},
       {{"--count", "-1"}, "--count: -1 is out of range: use 1 to 10"},
-      {{"--count", "1.5"}, "--count: 1.5 is out of range: use 1 to 10"},
+      {{"--count", "1.5"}, "--count: 1.5 is not a whole number: use 1 to 10"},
       {{"--count", "4294967297"}, "--count: 4294967297 is out of range: use 1 to 10"},
       {{"--more", "0"}, "--more: 0 is out of range: use 1 or more"},
       {{"--more", "18446744073709551616"},
        "--more: 18446744073709551616 is out of range: use 1 or more"},
       {{"--speed", "nan"}, "--speed: nan is out of range: use 0 to 1.5"},
       {{"--speed", "-0.1"}, "--speed: -0.1 is out of range: use 0 to 1.5"},
-      {{"--speed", "fast"}, "--speed: fast is out of range: use 0 to 1.5"},
+      {{"--speed", "fast"}, "--speed: fast is not a number: use 0 to 1.5"},
       {{"--cuont", "1"}, "The following arguments were not expected: 1 --cuont"},
   };
   for (const auto& [words, why] : wrong) {

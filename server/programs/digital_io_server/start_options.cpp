@@ -27,18 +27,22 @@ std::optional<int> DigitalIoStartOptions::parse(int argc, char** argv, Hardware&
       "mpf-digital-io-server - serves the lines of an IP-Unidig or DIO316I module to the clients "
       "of a backplane",
       "mpf-digital-io-server");
-  std::uint64_t pollMs = 0;
+  std::uint64_t pollMs = kDefaultPoll.count();
   std::uint32_t both = 0;
   std::string kindName = "IP-Unidig-I";
   place.addTo(app, "Name of the module; clients find its servers as <module>In and <module>Out");
   arguments.addQueueSizeTo(app);
   app.add_option("mspoll", pollMs, "Longest time between two readings of the inputs [ms]; 0: 100")
+      ->capture_default_str()
       ->check(wholeNumber(0, 3'600'000));
   app.add_option("intvec", io.vector, "Interrupt vector, 1 to 255; 0: no interrupts")
+      ->capture_default_str()
       ->check(wholeNumber(0, 255));
-  app.add_option("risingmask", io.rising, "Inputs that interrupt on a rising edge, as 0xff");
-  app.add_option("fallingmask", io.falling, "Inputs that interrupt on a falling edge");
-  app.add_option("bimask", both, "Inputs that interrupt on both edges");
+  app.add_option("risingmask", io.rising, "Inputs that interrupt on a rising edge, as 0xff")
+      ->capture_default_str();
+  app.add_option("fallingmask", io.falling, "Inputs that interrupt on a falling edge")
+      ->capture_default_str();
+  app.add_option("bimask", both, "Inputs that interrupt on both edges")->capture_default_str();
   app.add_option("maxclients", maxClients,
                  "Ignored, kept for old command lines: any number of clients may monitor");
   app.add_option("--kind", kindName, "Kind of a model; a real module identifies itself")
