@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <stdexcept>
 #include <utility>
 
@@ -16,11 +15,8 @@ constexpr std::chrono::milliseconds kLookAtBoard{10};
 }  // namespace
 
 void expectIp330Channels(const Ip330& board, int first, int last) {
-  const auto settings = board.settings();
-  if (settings.has(first) && settings.has(last) && first <= last) return;
-  throw std::invalid_argument(
-      fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last,
-                  settings.firstChannel, settings.lastChannel));
+  if (const auto problem = board.settings().problemOfChannels(first, last); !problem.empty())
+    throw std::invalid_argument(problem);
 }
 
 Ip330Scan::Ip330Scan(Ip330& board, int first, int last)

@@ -75,4 +75,10 @@ std::string Ip330Settings::problem() const {
   return ip330TimerOf(scanMode, channels(), microsecondsPerScan).problem;
 }
 
+std::string Ip330Settings::problemOfChannels(int first, int last) const {
+  if (has(first) && has(last) && first <= last) return {};
+  return fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last,
+                     firstChannel, lastChannel);
+}
+
 }  // namespace mpf

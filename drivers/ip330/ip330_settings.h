@@ -80,6 +80,8 @@ struct Ip330Settings {
   }
   // Returns a sentence about the first invalid setting; empty when all are valid.
   [[nodiscard]] std::string problem() const;
+  // The same about channels of a client of the board; empty when the board scans all of them.
+  [[nodiscard]] std::string problemOfChannels(int first, int last) const;
 };
 
 }  // namespace mpf

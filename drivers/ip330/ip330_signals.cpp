@@ -26,7 +26,7 @@ std::vector<std::string> split(std::string_view text, char separator) {
 
 template <class Number>
 Number parseNumber(const std::string& text) {
-  if (const auto number = tryNumber<Number>(text)) return *number;
+  if (const auto number = tryNumber<Number>(text); number && std::isfinite(*number)) return *number;
   throw std::invalid_argument(fmt::format("\"{}\" is not a number", text));
 }
 

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <map>
 #include <memory>
+#include <stdexcept>
+#include <string>
 
 #include "base/run_main.h"
 #include "base/stop_bell.h"
@@ -32,8 +34,11 @@ std::unique_ptr<mpf::Ip330Model> makeAdc(const mpf::Ip330StartOptions& options,
     if (wires == nullptr) throw std::invalid_argument("a wire needs --wires FILE");
     return [wire = wires->wire(name)](double) { return wire.get(); };
   };
-  for (auto& [channel, signal] : mpf::parseIp330Signals(options.signals, kinds))
+  for (auto& [channel, signal] : mpf::parseIp330Signals(options.signals, kinds)) {
+    if (const auto problem = options.settings.problemOfChannels(channel, channel); !problem.empty())
+      throw std::invalid_argument("--signal: " + problem);
     model->setSignal(channel, signal);
+  }
   return model;
 }
 

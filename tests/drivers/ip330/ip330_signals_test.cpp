@@ -26,8 +26,9 @@ TEST(Ip330Signals, CanBeOfOtherKinds) {
 }
 
 TEST(Ip330Signals, NameTheInvalidPart) {
-  for (const auto* const text : {"", "0", "0=", "0=dc", "0=dc:x", "0=dc:1x", "32=dc:1", "-1=dc:1",
-                                 "x=dc:1", "0=sine:5", "0=sine:1:2:3:4", "0=square:1", "0=dc:1,"}) {
+  for (const auto* const text :
+       {"", "0", "0=", "0=dc", "0=dc:x", "0=dc:1x", "0=dc:nan", "0=sine:inf:1", "32=dc:1",
+        "-1=dc:1", "x=dc:1", "0=sine:5", "0=sine:1:2:3:4", "0=square:1", "0=dc:1,"}) {
     EXPECT_THROW(static_cast<void>(parseIp330Signals(text)), std::invalid_argument) << text;
   }
 }
