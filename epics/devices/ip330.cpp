@@ -6,10 +6,12 @@
 //
 // Source  manual, "EXAMPLE Implementation: ip330Scan"; the EPICS module ip330.
 #include <aiRecord.h>
+#include <algorithm>
 #include <cstring>
 #include <dbAccess.h>
 #include <errlog.h>
 #include <longoutRecord.h>
+#include <string_view>
 
 #include <mpf/epics/dev_mpf.h>
 #include <mpf/ip330_commands.h>
@@ -21,11 +23,16 @@ namespace {
 
 constexpr double kMaxCode = 0xffff;
 
+std::string_view withoutBlanks(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+  return text.substr(0, text.find_last_not_of(' ') + 1);
+}
+
 class DevAiIp330Scan final : public DevMpf {
  public:
   explicit DevAiIp330Scan(aiRecord* record)
       : DevMpf(reinterpret_cast<dbCommon*>(record), &record->inp) {
-    const std::string_view text = getUserParm();
+    const auto text = withoutBlanks(getUserParm());
     gain_ = text.empty() ? 0 : tryNumber<int>(text).value_or(-1);
     if (gain_ < 0 || gain_ > 3) {
       errlogPrintf("%s: INP: gain \"%s\": use 0, 1, 2 or 3\n", record->name, getUserParm());

@@ -60,6 +60,17 @@ TEST(CheckDatabases, FailsWhenALinkIsInvalid) {
   }
 }
 
+// As the original, which read the gain with sscanf().
+TEST(CheckDatabases, AcceptsBlanksAroundAGain) {
+  const TemporaryFolder folder;
+  static_cast<void>(folder.write(
+      "a.db", R"(record(ai, "v") { field(DTYP, "ip330Scan") field(INP, "#C0 S0 @adc, 2 ") })"));
+
+  const auto result = checkDatabases(folder.path());
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 0) << result.output;
+}
+
 TEST(CheckDatabases, DatabasesOfSitesConnect) {
   const char* folder = std::getenv("MPF_CORPUS");
   const auto databases = std::filesystem::path(folder != nullptr ? folder : MPF_TEST_CORPUS) / "db";
