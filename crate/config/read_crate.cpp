@@ -123,6 +123,11 @@ class CrateReader {
       const auto* const node = value.get(option.fields[i]);
       if (node == nullptr) continue;
       const auto text = textOf(*node);
+      if (text && text->empty()) {
+        table.refuse(*node, fmt::format("{} of {} is empty; leave it out for its default",
+                                        option.fields[i], option.key));
+        return std::nullopt;
+      }
       if (!text || text->find(',') != std::string::npos) {
         table.refuse(*node, fmt::format("{} of {} must be a text without commas, or a number",
                                         option.fields[i], option.key));

@@ -20,7 +20,9 @@ constexpr const char* kServerForm = "SERVER,PORT[,BUFSIZE[,QUEUESIZE[,EOMSTR[,CI
 constexpr int kLongestAnswer = 1 << 20;
 constexpr int kLongestQueue = LinkGeometry::kMaxQueueSize;
 
+// "none" serves where an empty text is the default.
 std::optional<std::string> tryReadEom(const std::string& text) {
+  if (text == "none") return "";
   auto bytes = tryUnescape(text);
   if (bytes && bytes->size() > 2) bytes.reset();
   return bytes;
@@ -41,7 +43,8 @@ SerialServerStart readServer(OptionFields& words) {
   const auto eom = words.word("end of message", "\\r");
   const auto bytes = tryReadEom(eom);
   if (!bytes)
-    words.complain(fmt::format("end of message {}: use 0 to 2 bytes, with escapes as in C", eom));
+    words.complain(
+        fmt::format("end of message {}: use 1 or 2 bytes, with escapes as in C, or none", eom));
   start.serial.eom = *bytes;
   start.serial.circularBuffer = words.number("circular", 1) != 0;
   return start;
@@ -106,14 +109,16 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
       ->capture_default_str()
       ->check(wholeNumber(1, kLongestQueue));
   app.add_option("eomstr", eom,
-                 "End of message of the instrument: 0 to 2 bytes, with escapes as in C")
+                 "End of message of the instrument: 1 or 2 bytes, with escapes as in C, or none")
       ->capture_default_str();
   app.add_option("circular", first.serial.circularBuffer,
                  "1: keep bytes that are received while no request reads; 0: drop them")
       ->capture_default_str();
-  addWords(app, "--server", kServerForm,
-           "Adds a server, with the fields of the arguments above; may be repeated",
-           [&others](OptionFields& words) { others.push_back(readServer(words)); });
+  addWords(
+      app, "--server", kServerForm,
+      "Adds a server, with the fields of the arguments above, whose defaults empty fields have; "
+      "may be repeated",
+      [&others](OptionFields& words) { others.push_back(readServer(words)); });
   const std::array ofTerminals{
       app.add_option("--baud", settings.baud, "Speed of terminal devices [bit/s]")
           ->capture_default_str(),
@@ -149,7 +154,7 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
   const auto bytes = tryReadEom(eom);
   if (!bytes)
     return refuseArguments(app.get_name(),
-                           "eomstr: " + eom + ": use 0 to 2 bytes, with escapes as in C");
+                           "eomstr: " + eom + ": use 1 or 2 bytes, with escapes as in C, or none");
   first.serial.eom = *bytes;
   if (!first.server.empty()) servers.push_back(first);
   servers.insert(servers.end(), others.begin(), others.end());

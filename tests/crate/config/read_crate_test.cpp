@@ -160,6 +160,9 @@ TEST_F(ReadCrateTest, ErrorsSayWhatToWrite) {
   EXPECT_THAT(
       errorsOf("[[server]]\nprogram = \"serial\"\nserver = [{server = \"a\", prot = \"b\"}]\n"),
       HasSubstr("lab.toml:3:26: server: unknown key \"prot\"; did you mean \"port\"?"));
+  EXPECT_THAT(
+      errorsOf("[[server]]\nprogram = \"serial\"\nserver = [{server = \"a\", eomstr = \"\"}]\n"),
+      HasSubstr("lab.toml:3:35: eomstr of server is empty; leave it out for its default"));
   EXPECT_THAT(errorsOf("[[server]]\nprogram = \"serial\"\nserver = \"a\"\nport = \"b\"\n"
                        "octal-timing = 1\n"),
               HasSubstr("lab.toml:5:16: octal-timing is an integer; write true or false"));

@@ -134,7 +134,7 @@ TEST_F(OctalProgramTest, ReportsInvalidOptions) {
   expectRefused(with({"dmm", "x", "--server", "other,x", "--octal-port", "x,U,0"}),
                 "port x: has two servers");
   expectRefused({"--server", "dmm,/dev/null,1000,20,\\q\\q\\q"},
-                "end of message \\q\\q\\q: use 0 to 2 bytes");
+                "end of message \\q\\q\\q: use 1 or 2 bytes");
   expectRefused({"--server", "dmm,/dev/null,1000,99999"}, "queue size 99999: use 1 to 16384");
   expectRefused({"--server", "dmm,/dev/null,0"}, "longest answer 0: use 1 to 1048576 bytes");
   expectRefused({"--server", "dmm,/dev/null,1000,20,\\r,1,more"}, "unexpected field \"more\"");

@@ -76,6 +76,18 @@ TEST(SerialStartOptions, TheEndOfAMessageMayBeEmpty) {
   EXPECT_EQ(options.servers.at(0).serial.eom, "");
 }
 
+TEST(SerialStartOptions, AServerWithoutEndOfMessageHasNone) {
+  SerialStartOptions options;
+  ASSERT_EQ(
+      parseSerial(options, {"a", "/dev/ttyS0", "500", "30", "none", "--server",
+                            "b,/dev/ttyS1,500,30,none", "--server", "c,/dev/ttyS2,500,30,,1"}),
+      std::nullopt);
+
+  EXPECT_EQ(options.servers.at(0).serial.eom, "");
+  EXPECT_EQ(options.servers.at(1).serial.eom, "");
+  EXPECT_EQ(options.servers.at(2).serial.eom, "\r") << "an empty field is the default";
+}
+
 TEST(SerialStartOptions, LimitsApplyToAllServers) {
   SerialStartOptions options;
   ASSERT_EQ(parseSerial(options,
@@ -119,15 +131,15 @@ TEST(SerialStartOptions, RefuseContradictions) {
 
 TEST(SerialStartOptions, RefuseInvalidFields) {
   EXPECT_THAT(serialComplaint({"a", "x", "500", "30", "\\q"}),
-              HasSubstr("eomstr: \\q: use 0 to 2 bytes"));
+              HasSubstr("eomstr: \\q: use 1 or 2 bytes"));
   EXPECT_THAT(serialComplaint({"a", "x", "500", "30", "abc"}),
-              HasSubstr("eomstr: abc: use 0 to 2 bytes"));
+              HasSubstr("eomstr: abc: use 1 or 2 bytes"));
   EXPECT_THAT(serialComplaint({"--server", "a,x,0"}),
               HasSubstr("longest answer 0: use 1 to 1048576 bytes"));
   EXPECT_THAT(serialComplaint({"--server", "a,x,1,99999"}),
               HasSubstr("queue size 99999: use 1 to 16384"));
   EXPECT_THAT(serialComplaint({"--server", "a,x,1,20,abc"}),
-              HasSubstr("end of message abc: use 0 to 2 bytes"));
+              HasSubstr("end of message abc: use 1 or 2 bytes"));
 }
 
 }  // namespace
