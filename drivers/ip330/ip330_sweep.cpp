@@ -12,8 +12,6 @@ namespace mpf {
 namespace {
 
 // an array of all points is at most half the limit of a message
-constexpr int kMostPoints = 1 << 23;
-
 bool isTime(double seconds) { return std::isfinite(seconds) && seconds >= 0; }
 
 int scansPerPoint(const Ip330& board, double secondsPerPoint) {
@@ -28,8 +26,8 @@ int scansPerPoint(const Ip330& board, double secondsPerPoint) {
 Ip330Sweep::Ip330Sweep(Ip330& board, int first, int last, int maxPoints)
     : board_(board), first_(first), last_(last), maxPoints_(maxPoints), points_(maxPoints) {
   expectIp330Channels(board, first, last);
-  if (maxPoints < 1 || maxPoints > kMostPoints)
-    throw std::invalid_argument(fmt::format("{} points: use 1 to {}", maxPoints, kMostPoints));
+  if (maxPoints < 1 || maxPoints > kIp330MostPoints)
+    throw std::invalid_argument(fmt::format("{} points: use 1 to {}", maxPoints, kIp330MostPoints));
   const auto channels = static_cast<std::size_t>(last) - static_cast<std::size_t>(first) + 1;
   sums_.resize(channels);
   data_.assign(channels, std::vector<std::int32_t>(static_cast<std::size_t>(maxPoints)));

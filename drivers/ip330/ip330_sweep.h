@@ -19,6 +19,8 @@
 
 namespace mpf {
 
+inline constexpr int kIp330MostPoints = 1 << 23;  // of a sweep
+
 class Ip330Sweep {
  public:
   // Creates arrays of `maxPoints` points; all of them are used until trySetPoints() says otherwise.

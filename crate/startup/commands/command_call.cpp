@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <utility>
 
+#include "shm/link.h"
+
 namespace mpf::startup {
 
 std::string CommandCall::text(std::size_t index, std::string_view what) {
@@ -49,6 +51,10 @@ std::int64_t CommandCall::integer(std::size_t index, std::string_view what, std:
   return *number;
 }
 
+std::int64_t CommandCall::queueSize(std::size_t index) {
+  return integer(index, "queueSize", 0, LinkGeometry::kMaxQueueSize);
+}
+
 char CommandCall::letter(std::size_t index, std::string_view what, std::string_view allowed,
                          char otherwise) {
   const auto value = command_.argument(index);
@@ -66,6 +72,7 @@ char CommandCall::letter(std::size_t index, std::string_view what, std::string_v
 
 void CommandCall::refuse(std::size_t index, const std::string& text) {
   isValid_ = false;
+  if (!refused_.insert(index).second) return;
   shell_.reportArgument(Severity::error, command_, index,
                         fmt::format("{}: {}", command_.name, text));
 }

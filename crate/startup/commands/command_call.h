@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -41,10 +42,12 @@ class CommandCall {
   std::string textOr(std::size_t index, std::string_view what, std::string otherwise);
   std::int64_t integer(std::size_t index, std::string_view what, std::int64_t least,
                        std::int64_t most);
+  // Requests of one client that may wait; 0: the default of the program.
+  std::int64_t queueSize(std::size_t index);
   // The first character of "N", or of 'N'; `otherwise` when the argument is missing.
   char letter(std::size_t index, std::string_view what, std::string_view allowed, char otherwise);
 
-  // Reports an error at an argument.
+  // Reports an error at an argument, unless one was reported there before.
   void refuse(std::size_t index, const std::string& text);
   void warn(const std::string& text) { shell_.report(Severity::warning, command_, text); }
   // Says that this command, or the part of it that `what` names, is not executed, and why.
@@ -65,6 +68,7 @@ class CommandCall {
   const Command& command_;
   StartupShell& shell_;
   bool isValid_ = true;
+  std::set<std::size_t> refused_;  // arguments
 };
 
 }  // namespace mpf::startup

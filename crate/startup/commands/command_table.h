@@ -41,5 +41,15 @@ struct SiteArguments {
 
 // Reads the settings of a serial line: 9600, "N", 1, 8, "N". Missing ones have their defaults.
 [[nodiscard]] LineSettings readLineSettings(CommandCall& call, std::size_t index);
+// The same for a port of an octal UART, whose chip has few speeds.
+[[nodiscard]] LineSettings readOctalSettings(CommandCall& call, std::size_t index);
+// Refuses a speed that this chip does not have.
+void checkOctalBaud(CommandCall& call, std::size_t index, std::int64_t baud);
+// Refuses a port of a module that has another name already.
+//   index  the argument with the number of the port
+void checkPortIsFree(CommandCall& call, std::size_t index, const StartupSite& site,
+                     const std::string& module, std::int64_t number);
+// Reads the end of message: 0 to 2 bytes, with escapes.
+[[nodiscard]] std::string readEndOfMessage(CommandCall& call, std::size_t index);
 
 }  // namespace mpf::startup

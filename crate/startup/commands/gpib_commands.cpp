@@ -13,6 +13,8 @@
 namespace mpf::startup {
 namespace {
 
+constexpr std::int64_t kMaxGpibBuffer = 16 << 20;
+
 // initGpibGsTi9914("module", "carrier", "site", intVec)
 Value initGpibModule(CommandCall& call, StartupSite& site) {
   const auto name = call.name(0, "module");
@@ -41,8 +43,8 @@ Value initGpibServer(CommandCall& call, StartupSite& site) {
   else if (call.isValid() && process->find("bufsize") != nullptr)
     call.refuse(1, fmt::format("the module \"{}\" has the server \"{}\" already", module,
                                process->valueOf("server")));
-  const auto bufferSize = call.integer(2, "bufferSize", 0, 1 << 30);
-  const auto queueSize = call.integer(3, "queueSize", 0, 10'000);
+  const auto bufferSize = call.integer(2, "bufferSize", 0, kMaxGpibBuffer);
+  const auto queueSize = call.queueSize(3);
   if (!call.isValid()) return Value::unavailable();
   setValue(*process, "server", server, call.place());
   setValue(*process, "bufsize", fmt::to_string(bufferSize == 0 ? 1024 : bufferSize), call.place());
@@ -57,7 +59,14 @@ Value configureLink(CommandCall& call, StartupSite& site) {
   const auto name = call.name(2, "name");
   if (!call.isValid()) return Value::unavailable();
   const auto* const module = site.findModule("gpib", name);
-  const auto location = module == nullptr ? board : site.location.value_or(0);
+  const auto here = site.location.value_or(0);
+  const auto location = module == nullptr ? board : here;
+  if (location != board)
+    call.warn(
+        fmt::format("HiDEOSGpibLinkConfig: boardId {} is ignored, because \"{}\" is a module "
+                    "of this file, at location {}; for a server at location {} give the "
+                    "module another name",
+                    board, name, here, board));
   site.ioc.add("HiDEOSGpibLinkConfig",
                {fmt::to_string(link), fmt::to_string(location),
                 module == nullptr ? name : module->valueOf("server")},

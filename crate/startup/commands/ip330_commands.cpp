@@ -4,18 +4,20 @@
 #include <algorithm>
 #include <fmt/format.h>
 
+#include "base/number.h"
 #include "crate/startup/commands/command_table.h"
 #include "crate/startup/commands/process_builder.h"
+#include "drivers/ip330/ip330_settings.h"
+#include "drivers/ip330/ip330_sweep.h"
 
 namespace mpf::startup {
 namespace {
 
-constexpr std::int64_t kMaxQueue = 10'000;
 constexpr std::int64_t kMaxMs = 1'000'000;
 
 // The last field of a server; 0 is the default of the program.
 std::string readQueueField(CommandCall& call, std::size_t index) {
-  const auto size = call.integer(index, "queueSize", 0, kMaxQueue);
+  const auto size = call.queueSize(index);
   return size == 0 ? "" : fmt::format(",{}", size);
 }
 
@@ -33,6 +35,42 @@ crate::Process* readModule(CommandCall& call, StartupSite& site, std::size_t ind
   call.refuse(index, fmt::format("{} is not a module of {}, which must come before this line",
                                  value.description(), creator));
   return nullptr;
+}
+
+// The number in a setting; `otherwise` when it is absent.
+int numberOf(const crate::Process& module, const std::string& key, int otherwise) {
+  return tryNumber<int>(module.valueOf(key)).value_or(otherwise);
+}
+
+// The settings of a module, as its server will read them.
+Ip330Settings settingsOf(const crate::Process& module) {
+  Ip330Settings settings;
+  settings.type = parseIp330Type(module.valueOf("type"));
+  settings.firstChannel = numberOf(module, "first", settings.firstChannel);
+  settings.lastChannel = numberOf(module, "last", settings.lastChannel);
+  settings.maxClients = numberOf(module, "maxclients", settings.maxClients);
+  settings.scanMode =
+      parseIp330ScanMode(numberOf(module, "scan-mode", static_cast<int>(settings.scanMode)));
+  if (const auto us = tryNumber<int>(module.valueOf("us-per-scan")))
+    settings.microsecondsPerScan = *us;
+  return settings;
+}
+
+// Checks the channels of a server, and whether the module can have one more.
+//   index  the argument with the first channel
+void checkClient(CommandCall& call, std::size_t index, const crate::Process* module,
+                 std::int64_t first, std::int64_t last) {
+  if (module == nullptr) return;
+  const auto settings = settingsOf(*module);
+  const auto problem = settings.problemOfChannels(static_cast<int>(first), static_cast<int>(last));
+  if (!problem.empty()) call.refuse(index, problem);
+  std::size_t clients = 0;
+  for (const auto* const key : {"scan", "sweep", "pid"})
+    if (const auto* const servers = module->find(key)) clients += servers->values.size();
+  if (clients >= static_cast<std::size_t>(settings.maxClients))
+    call.refuse(0, fmt::format("the module \"{}\" has {} servers of scans, sweeps and feedback "
+                               "already; its maxClients is {}",
+                               module->valueOf("module"), clients, settings.maxClients));
 }
 
 // What both forms of the command that creates a module have, in this order.
@@ -54,6 +92,10 @@ Ip330Module readIp330(CommandCall& call, StartupSite& site) {
 
 Value addIp330(CommandCall& call, StartupSite& site, const Ip330Module& module, std::int64_t first,
                std::int64_t last, std::int64_t maxClients, std::int64_t vector) {
+  const Ip330Settings settings{.type = parseIp330Type(std::string(1, module.type)),
+                               .firstChannel = static_cast<int>(first),
+                               .lastChannel = static_cast<int>(last)};
+  if (const auto problem = settings.problem(); !problem.empty()) call.refuse(5, problem);
   if (call.isValid() && site.findModule("ip330", module.name) != nullptr)
     call.refuse(0, fmt::format("the module \"{}\" exists already", module.name));
   if (!call.isValid()) return Value::unavailable();
@@ -84,6 +126,14 @@ Value initIp330(CommandCall& call, StartupSite& site) {
   return addIp330(call, site, module, first, last, maxClients, vector);
 }
 
+void checkPeriod(CommandCall& call, const crate::Process& module, std::int64_t mode,
+                 std::int64_t usPerScan) {
+  auto settings = settingsOf(module);
+  settings.scanMode = parseIp330ScanMode(static_cast<int>(mode));
+  if (usPerScan != 0) settings.microsecondsPerScan = static_cast<double>(usPerScan);
+  if (const auto problem = settings.problem(); !problem.empty()) call.refuse(3, problem);
+}
+
 // configIp330(ip330, scanMode, "Input", usPerScan, secBetweenCal)
 Value configIp330(CommandCall& call, StartupSite& site) {
   auto* const module = readModule(call, site, 0, "ip330", "initIp330");
@@ -93,6 +143,7 @@ Value configIp330(CommandCall& call, StartupSite& site) {
   const auto seconds = call.integer(4, "secBetweenCalibrate", -1, 1'000'000'000);
   if (trigger != "Input" && trigger != "Output")
     call.refuse(2, fmt::format("trigger \"{}\"; write Input or Output", trigger));
+  if (module != nullptr) checkPeriod(call, *module, mode, usPerScan);
   if (!call.isValid()) return Value::unavailable();
   setValue(*module, "scan-mode", fmt::to_string(mode), call.place());
   setValue(*module, "trigger", trigger, call.place());
@@ -107,7 +158,7 @@ Value configIp330(CommandCall& call, StartupSite& site) {
 Value initIp330AndScan(CommandCall& call, StartupSite& site) {
   const auto module = readIp330(call, site);
   const auto vector = call.integer(5, "interrupt vector", 0, 255);
-  static_cast<void>(call.integer(6, "queueSize", 0, kMaxQueue));
+  static_cast<void>(call.queueSize(6));
   return addIp330(call, site, module, 0, module.type == 'D' ? 15 : 31, 10, vector);
 }
 
@@ -121,6 +172,7 @@ Value initIp330Scan(CommandCall& call, StartupSite& site) {
   const bool hasMs = call.size() >= 6;
   const auto ms = hasMs ? call.integer(4, "msToAverage", 0, kMaxMs) : 0;
   const auto queue = readQueueField(call, hasMs ? 5 : 4);
+  checkClient(call, 2, module, first, last);
   if (!call.isValid()) return Value::unavailable();
   addValue(*module, "scan", fmt::format("{},{},{},{}{}", server, first, last, ms, queue),
            call.place());
@@ -145,8 +197,9 @@ Value initIp330Sweep(CommandCall& call, StartupSite& site) {
   const auto server = call.name(1, "server");
   const auto first = call.integer(2, "firstChan", 0, 31);
   const auto last = call.integer(3, "lastChan", 0, 31);
-  const auto points = call.integer(4, "maxPoints", 1, 100'000'000);
+  const auto points = call.integer(4, "maxPoints", 1, kIp330MostPoints);
   const auto queue = readQueueField(call, 5);
+  checkClient(call, 2, module, first, last);
   if (!call.isValid()) return Value::unavailable();
   addValue(*module, "sweep", fmt::format("{},{},{},{}{}", server, first, last, points, queue),
            call.place());
@@ -162,6 +215,7 @@ Value initIp330Pid(CommandCall& call, StartupSite& site) {
   const auto* const dac = readModule(call, site, 3, "dac128v", "initDAC128V");
   const auto dacChannel = call.integer(4, "DACChannel", 0, 7);
   const auto queue = readQueueField(call, 5);
+  checkClient(call, 2, module, channel, channel);
   if (!call.isValid()) return Value::unavailable();
   const auto name = dac->valueOf("module");
   const auto opened = fmt::format("{},{},{}", name, dac->valueOf("carrier"), dac->valueOf("site"));

@@ -7,17 +7,19 @@
 #include "crate/startup/commands/command_table.h"
 #include "crate/startup/commands/process_builder.h"
 #include "crate/startup/shell/lexer.h"
+#include "drivers/octal_uart/octal_uart_settings.h"
 
 namespace mpf::startup {
 namespace {
 
-constexpr std::int64_t kMaxSize = 1 << 20;
+constexpr std::int64_t kMaxSerialBuffer = 1 << 20;
 
+// Adds the port also after an error, which later commands need not repeat.
 Value addPort(CommandCall& call, StartupSite& site, SerialPort port) {
   port.place = call.place();
   port.source = call.source();
   const auto name = port.name;
-  if (call.isValid() && !site.serialLines.addPort(std::move(port)))
+  if (!name.empty() && !site.serialLines.addPort(std::move(port)))
     call.refuse(0, fmt::format("the port \"{}\" exists already", name));
   return call.isValid() ? Value() : Value::unavailable();
 }
@@ -28,12 +30,14 @@ Value initOctalUart(CommandCall& call, StartupSite& site) {
   const auto where = readSite(call, 1, site.boards);
   module.carrier = where.carrier;
   module.site = where.site;
-  module.ports = call.has(3) ? call.integer(3, "nports", 1, 8) : 8;
+  module.ports = call.has(3) ? call.integer(3, "nports", 4, 8) : 8;
+  if (module.ports != 4 && module.ports != 8)
+    call.refuse(3, fmt::format("nports is {}; a module has 4 or 8", module.ports));
   module.vector = call.integer(4, "interrupt vector", 0, 255);
   module.place = call.place();
   module.source = call.source();
   const auto name = module.name;
-  if (call.isValid() && !site.serialLines.addModule(std::move(module)))
+  if (!name.empty() && !site.serialLines.addModule(std::move(module)))  // also after an error
     call.refuse(0, fmt::format("the module \"{}\" exists already", name));
   return call.isValid() ? Value::ofOpaque(ModuleHandle{name}) : Value::unavailable();
 }
@@ -43,12 +47,13 @@ Value initOctalUartPort(CommandCall& call, StartupSite& site) {
   port.name = call.name(0, "port");
   port.module = call.name(1, "module");
   const auto* const module = site.serialLines.findModule(port.module);
-  if (module == nullptr && call.isValid())
+  if (module == nullptr && !port.module.empty())
     call.refuse(1, fmt::format("there is no module \"{}\"; initOctalUART(\"{}\", ...) must come "
                                "before this line",
                                port.module, port.module));
   port.index = call.integer(2, "number of the port", 0, module == nullptr ? 7 : module->ports - 1);
-  port.settings = readLineSettings(call, 3);
+  port.settings = readOctalSettings(call, 3);
+  checkPortIsFree(call, 2, site, port.module, port.index);
   return addPort(call, site, std::move(port));
 }
 
@@ -76,16 +81,16 @@ Value initSerialServer(CommandCall& call, StartupSite& site) {
   SerialServer server;
   server.name = call.name(0, "server");
   server.port = call.name(1, "port");
-  server.bufferSize = call.integer(2, "bufSize", 0, kMaxSize);
-  server.queueSize = call.integer(3, "queueSize", 0, kMaxSize);
-  server.endOfMessage = unescaped(call.textOr(4, "eom", ""));
+  server.bufferSize = call.integer(2, "bufSize", 0, kMaxSerialBuffer);
+  server.queueSize = call.queueSize(3);
+  server.endOfMessage = readEndOfMessage(call, 4);
   server.isCircular = !call.has(5) || call.integer(5, "circular mode", 0, 1) != 0;
   server.place = call.place();
   server.source = call.source();
-  if (server.endOfMessage.size() > 2)
+  if (const auto* const other = site.serialLines.serverOf(server.port))
     call.refuse(
-        4, fmt::format("eom has {} bytes; at most 2 are possible", server.endOfMessage.size()));
-  if (call.isValid() && site.serialLines.findPort(server.port) == nullptr) {
+        1, fmt::format("the port \"{}\" has the server \"{}\" already", server.port, other->name));
+  if (!server.port.empty() && site.serialLines.findPort(server.port) == nullptr) {
     const auto ports = site.serialLines.portNames();
     call.refuse(1, ports.empty()
                        ? fmt::format("there is no port \"{}\"; initOctalUARTPort or initTtyPort "
@@ -135,6 +140,32 @@ LineSettings readLineSettings(CommandCall& call, std::size_t index) {
   line.bits = call.has(index + 3) ? call.integer(index + 3, "bits", 5, 8) : 8;
   line.flow = call.letter(index + 4, "flow control", "NH", 'N');
   return line;
+}
+
+LineSettings readOctalSettings(CommandCall& call, std::size_t index) {
+  const auto line = readLineSettings(call, index);
+  checkOctalBaud(call, index, line.baud);
+  return line;
+}
+
+void checkOctalBaud(CommandCall& call, std::size_t index, std::int64_t baud) {
+  if (const auto problem = octalUartProblemOf({.baud = static_cast<int>(baud)}, false);
+      !problem.empty())
+    call.refuse(index, problem);
+}
+
+void checkPortIsFree(CommandCall& call, std::size_t index, const StartupSite& site,
+                     const std::string& module, std::int64_t number) {
+  if (const auto* const other = site.serialLines.portOf(module, number))
+    call.refuse(index, fmt::format("port {} of the module \"{}\" is the port \"{}\" already",
+                                   number, module, other->name));
+}
+
+std::string readEndOfMessage(CommandCall& call, std::size_t index) {
+  auto bytes = unescaped(call.textOr(index, "eom", ""));
+  if (bytes.size() > 2)
+    call.refuse(index, fmt::format("eom has {} bytes; at most 2 are possible", bytes.size()));
+  return bytes;
 }
 
 }  // namespace mpf::startup

@@ -9,8 +9,10 @@
 namespace mpf::startup {
 namespace {
 
-// Bytes as the serial server takes them: with the escapes of C, and without commas.
+// Bytes as the serial server takes them: with the escapes of C, and without commas. An empty field
+// would be the default.
 std::string escaped(const std::string& bytes) {
+  if (bytes.empty()) return "none";
   std::string text;
   for (const char byte : bytes) {
     if (byte == '\r') text += "\\r";
@@ -68,6 +70,12 @@ const SerialServer* SerialLines::serverOf(const std::string& portOrAlias) const 
   return found != servers_.end() ? &*found : nullptr;
 }
 
+const SerialPort* SerialLines::portOf(const std::string& module, std::int64_t index) const {
+  const auto found = std::ranges::find_if(
+      ports_, [&](const SerialPort& port) { return port.module == module && port.index == index; });
+  return found != ports_.end() ? &*found : nullptr;
+}
+
 std::vector<std::string> SerialLines::portNames() const {
   std::vector<std::string> names;
   for (const auto& port : ports_) names.push_back(port.name);
@@ -99,14 +107,14 @@ crate::Process SerialLines::processOf(const SerialModule& module) const {
              fmt::format("{},{},{},{},{},{},{},{}", port.name, module.name, port.index, line.baud,
                          line.parity, line.stopBits, line.bits, line.flow),
              port.place);
-    addServers(port.name, port.name, process);
+    addServer(port.name, port.name, process);
   }
   return process;
 }
 
 crate::Process SerialLines::processOf(const SerialPort& port) const {
   auto process = newProcess("serial", port.name, port.place, port.source);
-  addServers(port.name, port.device, process);
+  addServer(port.name, port.device, process);
   addValue(process, "wait", "true", port.place);  // as the original, which started without the line
   if (port.device.starts_with("tcp:")) return process;
   const auto& line = port.settings;
@@ -118,16 +126,15 @@ crate::Process SerialLines::processOf(const SerialPort& port) const {
   return process;
 }
 
-void SerialLines::addServers(const std::string& port, const std::string& device,
-                             crate::Process& process) const {
-  for (const auto& server : servers_) {
-    if (server.port != port) continue;
-    addValue(process, "server",
-             fmt::format("{},{},{},{},{},{}", server.name, device, fieldOf(server.bufferSize),
-                         fieldOf(server.queueSize), escaped(server.endOfMessage),
-                         server.isCircular ? 1 : 0),
-             server.place);
-  }
+void SerialLines::addServer(const std::string& port, const std::string& device,
+                            crate::Process& process) const {
+  const auto* const server = serverOf(port);
+  if (server == nullptr) return;
+  addValue(process, "server",
+           fmt::format("{},{},{},{},{},{}", server->name, device, fieldOf(server->bufferSize),
+                       fieldOf(server->queueSize), escaped(server->endOfMessage),
+                       server->isCircular ? 1 : 0),
+           server->place);
 }
 
 }  // namespace mpf::startup

@@ -45,7 +45,7 @@ struct SerialPort {
 struct SerialServer {
   std::string name, port;
   std::int64_t bufferSize = 0, queueSize = 0;  // 0: the default
-  std::string endOfMessage;  // bytes
+  std::string endOfMessage;  // 0 to 2 bytes
   bool isCircular = true;
   std::string place, source;
 };
@@ -57,13 +57,15 @@ class SerialLines {
   bool addPort(SerialPort port);
   // A further name of an existing port.
   bool addAlias(const std::string& name, const std::string& port);
+  // Its port must have no server yet.
   void addServer(SerialServer server);
 
   // nullptr: nothing has this name.
   [[nodiscard]] const SerialModule* findModule(const std::string& name) const;
   [[nodiscard]] SerialPort* findPort(const std::string& portOrAlias);
-  // A server of the port; nullptr: the port has none.
+  // The server of the port; nullptr: the port has none.
   [[nodiscard]] const SerialServer* serverOf(const std::string& portOrAlias) const;
+  [[nodiscard]] const SerialPort* portOf(const std::string& module, std::int64_t index) const;
   [[nodiscard]] std::vector<std::string> portNames() const;
 
   // The processes of all ports that have a server.
@@ -73,14 +75,13 @@ class SerialLines {
   [[nodiscard]] const std::string& portNamed(const std::string& portOrAlias) const;
   [[nodiscard]] crate::Process processOf(const SerialModule& module) const;
   [[nodiscard]] crate::Process processOf(const SerialPort& port) const;
-  // Adds the servers of a port to its process.
-  void addServers(const std::string& port, const std::string& device,
-                  crate::Process& process) const;
+  // Adds the server of a port, if it has one, to its process.
+  void addServer(const std::string& port, const std::string& device, crate::Process& process) const;
 
   std::vector<SerialModule> modules_;
   std::vector<SerialPort> ports_;
   std::map<std::string, std::string> aliases_;  // to names of ports
-  std::vector<SerialServer> servers_;
+  std::vector<SerialServer> servers_;  // of different ports
 };
 
 }  // namespace mpf::startup

@@ -43,6 +43,7 @@ void addPort(CommandCall& call, StartupSite& site, std::size_t index, const std:
     call.refuse(index,
                 fmt::format("{} is not the result of tyGSOctalModuleInit", value.description()));
   const auto number = call.integer(index + 1, "number of the port", 0, 7);
+  if (module != nullptr) checkPortIsFree(call, index + 1, site, module->name, number);
   if (!call.isValid()) return;
   if (!site.serialLines.addPort(
           {name, module->name, number, "", settings, call.place(), call.source()}))
@@ -60,7 +61,7 @@ Value config(CommandCall& call, StartupSite& site) {
   const auto* const device = value.opaque<DeviceHandle>();
   if (device == nullptr)
     call.refuse(0, fmt::format("{} is not the result of tyGSOctalDevCreate", value.description()));
-  const auto settings = readLineSettings(call, 1);
+  const auto settings = readOctalSettings(call, 1);
   if (!call.isValid()) return Value::unavailable();
   site.serialLines.findPort(device->name)->settings = settings;
   return Value();
@@ -71,6 +72,7 @@ Value initTtyVxPort(CommandCall& call, StartupSite& site) {
   const auto name = call.name(0, "port");
   const auto device = call.name(1, "device");
   const auto baud = call.integer(2, "baud", 1, 4'000'000);
+  checkOctalBaud(call, 2, baud);
   if (!call.isValid()) return Value::unavailable();
   auto* const port = site.serialLines.findPort(device);
   if (port == nullptr) {
@@ -91,9 +93,9 @@ Value initTtyVxPort(CommandCall& call, StartupSite& site) {
 // server.
 Value mpfInit(CommandCall& call, StartupSite& site) {
   const auto name = call.name(0, "server");
-  const auto settings = readLineSettings(call, 3);
+  const auto settings = readOctalSettings(call, 3);
   addPort(call, site, 1, name, settings);
-  SerialServer server{name, name,         1000,         50, call.textOr(8, "eom", ""),
+  SerialServer server{name, name,         1000,         50, readEndOfMessage(call, 8),
                       true, call.place(), call.source()};
   if (!call.isValid()) return Value::unavailable();
   site.serialLines.addServer(std::move(server));

@@ -34,6 +34,15 @@ TEST_F(GpibCommands, LinksAreThoseOfTheIoc) {
       << "the server of the module";
 }
 
+TEST_F(GpibCommands, ALinkToAModuleOfTheFileWarnsOfAnotherLocation) {
+  const auto at = [&](const char* board) {
+    return remarksOf(read(kGpibModule + "HiDEOSGpibLinkConfig(10," + board + ",\"M\")\niocInit\n"));
+  };
+  EXPECT_THAT(at("0"), testing::IsEmpty());
+  EXPECT_THAT(at("1"), ElementsAre(HasSubstr("boardId 1 is ignored, because \"M\" is a module of "
+                                             "this file, at location 0")));
+}
+
 TEST_F(GpibCommands, ASnifferIsAProgram) {
   const auto startup = read(kGpibModule + "gpibSniff(\"M\",3)\n");
 

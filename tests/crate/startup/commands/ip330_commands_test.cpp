@@ -81,6 +81,26 @@ TEST_F(Ip330Commands, RefuseWhatIsNoModule) {
               HasSubstr("range \"5\"; write -5to5"));
 }
 
+// The server of the crate would not start.
+TEST_F(Ip330Commands, RefuseWhatTheServerRefuses) {
+  const auto board = [](const std::string& arguments) {
+    return kCarrier + "p = initIp330(\"adc\", \"ipac\", \"IP_a\", " + arguments + ")\n";
+  };
+  EXPECT_THAT(errorOf(board(R"("D", "-5to5", 0, 31, 5, 120)")),
+              HasSubstr("3:52: error: initIp330: channels 0 to 31: use 0 to 15"));
+  EXPECT_THAT(errorOf(kModule + "configIp330(p, 3, \"Input\", 100, 60)\n"),
+              HasSubstr("4:28: error: configIp330: 100 us per scan of 16 channels in mode "
+                        "burstContinuous: use "));
+  EXPECT_THAT(errorOf(kModule + "initIp330Scan(p, \"s\", 20, 3, 100)\n"),
+              HasSubstr("4:23: error: initIp330Scan: channels 20 to 3 are not available: the board "
+                        "scans 0 to 15"));
+  EXPECT_THAT(errorOf(kModule + "initIp330Sweep(p, \"s\", 0, 16, 100, 20)\n"),
+              HasSubstr("channels 0 to 16 are not available"));
+  EXPECT_THAT(errorOf(board(R"("D", "-5to5", 0, 15, 1, 120)") +
+                      "initIp330Scan(p, \"s\", 0, 3, 100)\ninitIp330Scan(p, \"t\", 0, 3, 100)\n"),
+              HasSubstr("5:15: error: initIp330Scan: the module \"adc\" has 1 servers"));
+}
+
 // The error of a module is not repeated for each of its servers.
 TEST_F(Ip330Commands, TheServersOfAModuleThatFailedAreNoFurtherErrors) {
   try {

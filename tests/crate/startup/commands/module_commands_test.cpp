@@ -28,6 +28,23 @@ TEST_F(ModuleCommands, DigitalIoTakesAsManyArgumentsAsWereWritten) {
                           "maxclients=10"));
 }
 
+TEST_F(ModuleCommands, AQueueSizeOf0IsTheDefault) {
+  const auto startup = read(kCarrier +
+                            "initDAC128V(\"DAC\", \"ipac\", \"IP_b\", 0)\n"
+                            "initIpUnidig(\"U\", \"ipac\", \"IP_c\", 0, 50)\n");
+  EXPECT_THAT(settingsOf(startup, "DAC"), testing::Contains("queuesize=20"));
+  EXPECT_THAT(settingsOf(startup, "U"), testing::IsSupersetOf({"queuesize=20", "mspoll=50"}));
+}
+
+// The server of the crate would not start.
+TEST_F(ModuleCommands, RefuseWhatTheServerRefuses) {
+  const std::string unidig = kCarrier + "initIpUnidig(\"U\", \"ipac\", \"IP_c\", ";
+  EXPECT_THAT(errorOf(unidig + "20, 3600001)\n"), HasSubstr("mspoll is 3600001; it must be"));
+  EXPECT_THAT(errorOf(unidig + "20, 100, 300)\n"),
+              HasSubstr("3:44: error: initIpUnidig: intvec is 300; it must be between 0 and 255"));
+  EXPECT_THAT(errorOf(unidig + "16385)\n"), HasSubstr("queueSize is 16385; it must be between 0"));
+}
+
 TEST_F(ModuleCommands, RefuseAModuleTwice) {
   EXPECT_THAT(errorOf(kCarrier + "initDAC128V(\"D\", \"ipac\", \"IP_b\", 20)\n"
                                  "initDAC128V(\"D\", \"ipac\", \"IP_c\", 20)\n"),

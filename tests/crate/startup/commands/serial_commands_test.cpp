@@ -22,7 +22,7 @@ TEST_F(SerialCommands, AllPortsOfAModuleAreServedByOneProcess) {
       settingsOf(startup, "uart"),
       ElementsAre("octal-uart=uart,ipac,IP_a,8,100", "octal-port=UART[1],uart,1,19200,E,2,7,H",
                   "octal-port=UART[0],uart,0,9600,N,1,8,N", "server=a[1],UART[1],1000,20,\\r\\n,1",
-                  "server=a[0],UART[0],,,,0"));
+                  "server=a[0],UART[0],,,none,0"));
   EXPECT_EQ(startup.crate.processes.size(), 1u);
   EXPECT_EQ(startup.crate.processes.at(0).comment,
             "st.cmd:3: initOctalUART(\"uart\", \"ipac\", \"IP_a\", 8, 100)");
@@ -36,7 +36,7 @@ TEST_F(SerialCommands, OtherPortsHaveAProcessEach) {
       "initSerialServer(\"second\", \"two\", 1000, 20, \"\\x03,\")\n");
 
   EXPECT_THAT(settingsOf(startup, "one"),
-              ElementsAre("server=first,/dev/ttyS0,1000,20,,1", "wait=true", "baud=19200",
+              ElementsAre("server=first,/dev/ttyS0,1000,20,none,1", "wait=true", "baud=19200",
                           "parity=O", "stop-bits=2", "bits=7", "flow=N"));
   EXPECT_THAT(settingsOf(startup, "two"),
               ElementsAre("server=second,tcp:moxa:4001,1000,20,\\x03\\x2c,1", "wait=true"));
@@ -98,17 +98,51 @@ TEST_F(SerialCommands, RefuseInvalidArguments) {
               HasSubstr("2:38: error: initSerialServer: eom has 3 bytes"));
 }
 
+// The server of the crate would not start.
+TEST_F(SerialCommands, RefuseWhatTheServerRefuses) {
+  const std::string uart = kCarrier + "initOctalUART(\"u\", \"ipac\", \"IP_a\", 8, 100)\n";
+  const std::string port = "initOctalUARTPort(\"p\", \"u\", 0, 9600, \"N\", 1, 8, \"N\")\n";
+  EXPECT_THAT(errorOf(kCarrier + "initOctalUART(\"u\", \"ipac\", \"IP_a\", 5, 100)\n"),
+              HasSubstr("3:36: error: initOctalUART: nports is 5; a module has 4 or 8"));
+  EXPECT_THAT(errorOf(uart + "initOctalUARTPort(\"p\", \"u\", 0, 9601, \"N\", 1, 8, \"N\")\n"),
+              HasSubstr("4:32: error: initOctalUARTPort: baud 9601: the chip supports 75, "));
+  EXPECT_THAT(errorOf(uart + port + "initOctalUARTPort(\"q\", \"u\", 0, 9600)\n"),
+              HasSubstr("5:29: error: initOctalUARTPort: port 0 of the module \"u\" is the port "
+                        "\"p\" already"));
+  EXPECT_THAT(errorOf(uart + port + "initSerialServer(\"s\", \"p\", 1000, 20000, \"\\r\")\n"),
+              HasSubstr("5:34: error: initSerialServer: queueSize is 20000; it must be between 0 "
+                        "and 16384"));
+  EXPECT_THAT(
+      errorOf(uart + port + "initSerialServer(\"s\", \"p\")\ninitSerialServer(\"t\", \"p\")\n"),
+      HasSubstr("6:23: error: initSerialServer: the port \"p\" has the server \"s\" "
+                "already"));
+}
+
+TEST_F(SerialCommands, RepeatNoErrorOfTheirModuleOrPort) {
+  try {
+    static_cast<void>(read(kCarrier + "initOctalUART(\"u\", \"ipac\", \"IP_a\", 5, 100)\n"
+                                      "initOctalUARTPort(\"p\", \"u\", 0, 9601)\n"
+                                      "initSerialServer(\"s\", \"p\", 1000, 20, \"\\r\")\n"));
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("nports is 5"));
+    EXPECT_THAT(error.what(), HasSubstr("baud 9601"));
+    EXPECT_THAT(error.what(), testing::Not(HasSubstr("there is no")));
+  }
+}
+
 // Both errors of a line, and those of later lines, are reported at once.
 TEST_F(SerialCommands, ReportAllErrors) {
   try {
     static_cast<void>(
         read("initTtyPort(\"p\", \"/dev/ttyS0\", 0, \"N\", 3)\n"
-             "initSerialServer(\"s\", \"q\")\n"));
+             "initSerialServer(\"s\", \"q\", 1000, 20000)\n"));
     FAIL();
   } catch (const ConfigError& error) {
     EXPECT_THAT(error.what(), HasSubstr("baud is 0"));
     EXPECT_THAT(error.what(), HasSubstr("stopBits is 3"));
     EXPECT_THAT(error.what(), HasSubstr("there is no port \"q\""));
+    EXPECT_THAT(error.what(), HasSubstr("queueSize is 20000"));
   }
 }
 

@@ -18,13 +18,12 @@ TEST_F(TyGsOctalCommands, ADeviceIsAPortUnderBothNames) {
                             "tty = tyGSOctalDevCreate(\"/tyGS/0/3\", uart, 3, 1000, 1000)\n"
                             "initTtyVxPort(\"UART[3]\", \"/tyGS/0/3\", 19200, 1000)\n"
                             "initSerialServer(\"s\", \"UART[3]\", 1000, 20, \"\\r\")\n"
-                            "initSerialServer(\"t\", \"/tyGS/0/3\", 1000, 20, \"\")\n"
                             "tyGSOctalConfig(tty, 9600, 'E', 2, 7, 'N')\n");
 
   EXPECT_THAT(settingsOf(startup, "octal-carrier0-IP_a"),
               ElementsAre("octal-uart=octal-carrier0-IP_a,carrier0,IP_a,8,128",
                           "octal-port=/tyGS/0/3,octal-carrier0-IP_a,3,9600,E,2,7,N",
-                          "server=s,/tyGS/0/3,1000,20,\\r,1", "server=t,/tyGS/0/3,1000,20,,1"));
+                          "server=s,/tyGS/0/3,1000,20,\\r,1"));
 }
 
 TEST_F(TyGsOctalCommands, OneCommandDoesAll) {
@@ -33,7 +32,22 @@ TEST_F(TyGsOctalCommands, OneCommandDoesAll) {
 
   EXPECT_THAT(settingsOf(startup, "octal-carrier0-IP_a"),
               ElementsAre(testing::_, "octal-port=srv,octal-carrier0-IP_a,2,9600,N,1,8,N",
-                          "server=srv,srv,1000,50,,1"));
+                          "server=srv,srv,1000,50,none,1"));
+}
+
+TEST_F(TyGsOctalCommands, AreCheckedAsThoseOfReleaseOne) {
+  const std::string device = kModule + "tyGSOctalDevCreate(\"d\", uart, 3, 1000, 1000)\n";
+  EXPECT_THAT(errorOf(kModule + "tyGSMPFInit(\"s\", uart, 2, 9600, 'N', 1, 8, 'N', \"abc\")\n"),
+              HasSubstr("tyGSMPFInit: eom has 3 bytes"));
+  EXPECT_THAT(errorOf(kModule + "tyGSMPFInit(\"s\", uart, 2, 9601, 'N', 1, 8, 'N', \"\")\n"),
+              HasSubstr("tyGSMPFInit: baud 9601: the chip supports"));
+  EXPECT_THAT(errorOf(device + "initTtyVxPort(\"p\", \"d\", 9601, 1000)\n"),
+              HasSubstr("initTtyVxPort: baud 9601: the chip supports"));
+  EXPECT_THAT(errorOf(device + "tyGSOctalDevCreate(\"e\", uart, 3, 1000, 1000)\n"),
+              HasSubstr("is the port \"d\" already"));
+  EXPECT_THAT(errorOf(device + "initTtyVxPort(\"p\", \"d\", 9600, 1000)\n"
+                               "initSerialServer(\"s\", \"p\")\ninitSerialServer(\"t\", \"d\")\n"),
+              HasSubstr("the port \"d\" has the server \"s\" already"));
 }
 
 TEST_F(TyGsOctalCommands, RefuseWhatDoesNotExistYet) {
