@@ -77,8 +77,10 @@ std::string Ip330Settings::problem() const {
 
 std::string Ip330Settings::problemOfChannels(int first, int last) const {
   if (has(first) && has(last) && first <= last) return {};
-  return fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last,
-                     firstChannel, lastChannel);
+  const auto which = first == last ? fmt::format("channel {} is", first)
+                                   : fmt::format("channels {} to {} are", first, last);
+  return fmt::format("{} not available: the board scans {} to {}", which, firstChannel,
+                     lastChannel);
 }
 
 }  // namespace mpf

@@ -4,7 +4,7 @@
 //
 //   Value initDAC128V(CommandCall& call, StartupSite& site) {
 //     const auto module = call.name(0, "module");
-//     const auto queueSize = call.integer(3, "queueSize", 0, 10'000);
+//     const auto queueSize = call.queueSize(3);
 //     if (!call.isValid()) return Value::unavailable();
 //
 // Missing arguments are 0, as on vxWorks.

@@ -116,8 +116,8 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
       ->capture_default_str();
   addWords(
       app, "--server", kServerForm,
-      "Adds a server, with the fields of the arguments above, whose defaults empty fields have; "
-      "may be repeated",
+      "Adds a server, with the fields of the arguments above; an empty field has its default; may "
+      "be repeated",
       [&others](OptionFields& words) { others.push_back(readServer(words)); });
   const std::array ofTerminals{
       app.add_option("--baud", settings.baud, "Speed of terminal devices [bit/s]")

@@ -165,7 +165,7 @@ TEST_F(Ip330ProgramTest, ReportsInvalidArguments) {
            {{"--signal", "0=square:1"},
             "unknown kind of signal \"square\"; use one of dc, sine, wire"},
            {{"--signal", "0=wire:dac.0"}, "a wire needs --wires FILE"},
-           {{"--signal", "16=dc:1"}, "--signal: channels 16 to 16 are not available: the board"},
+           {{"--signal", "16=dc:1"}, "--signal: channel 16 is not available: the board"},
            {{"--signal", "0=dc:nan"}, "\"nan\" is not a number"},
            {{"--scan", "a,0,20"}, "the board scans 0 to 15"}}) {
     std::vector<std::string> all{"adc", "ipac", "IP_a"};

@@ -103,6 +103,22 @@ TEST_F(LineReaderTest, AFullCircularBufferDropsItsOldestBytes) {
   EXPECT_EQ(end(SerialPortStatus::timeout).bytes, "cdefgh");
 }
 
+TEST_F(LineReaderTest, AFullCircularBufferKeepsTheMarksOfItsBytes) {
+  receive(std::string(100, 'x'));
+  reader_.lineFailed(LineFault::overrun, 1);
+  receive("a\rbc\rd");
+
+  EXPECT_EQ(beginRead(), ByteHandlerResult::endRead);
+  const auto damaged = end();
+  EXPECT_EQ(beginRead(), ByteHandlerResult::endRead);
+  const auto sound = end();
+
+  EXPECT_EQ(damaged.bytes, "a\r");
+  EXPECT_EQ(damaged.faults, faultBit(LineFault::overrun));
+  EXPECT_EQ(sound.bytes, "bc\r");
+  EXPECT_EQ(sound.faults, 0);
+}
+
 TEST_F(LineReaderTest, AFlushDropsTheBytesBeforeTheRead) {
   receive("a\r");
 
