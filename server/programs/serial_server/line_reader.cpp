@@ -58,7 +58,6 @@ bool LineReader::tryContinue(bool mayBeLate) {
   const std::lock_guard lock(mutex_);
   continues_ = phase_ == Phase::collectingLate;
   mayBeLate_ = mayBeLate;
-  if (continues_) answer_ = {};
   return continues_;
 }
 
@@ -151,14 +150,22 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
       input_.push_back(static_cast<char>(byte));
       return ByteHandlerResult::endRead;
     }
-    if (phase_ == Phase::collectingLate) {
+    if (phase_ == Phase::collectingLate && isQuestion_) {
       dropLateAnswer();
       return circular_ ? collect(byte) : ByteHandlerResult::ok;
     }
-    input_.eraseFirst(1);  // circular buffer: drop the oldest byte
+    dropOldestByte();
   }
   input_.push_back(static_cast<char>(byte));
   return isRead && endsAnswer() ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+}
+
+// In the circular buffer, or of the late answer to a read, which then ends as one that is too long.
+void LineReader::dropOldestByte() {
+  input_.eraseFirst(1);
+  if (phase_ != Phase::collectingLate) return;
+  answer_.overflow = true;
+  if (returnedBytes_ > 0) --returnedBytes_;
 }
 
 void LineReader::noteSurplus() {
@@ -179,7 +186,8 @@ ByteHandlerResult LineReader::readBegins() {
   }
   phase_ = Phase::reading;
   if (!continues_ && (flush_ || !circular_)) input_.clear();
-  return completeBytes() != 0 ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+  const bool isOver = answer_.overflow || completeBytes() != 0;
+  return isOver ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
 }
 
 void LineReader::sendBegins() {

@@ -98,6 +98,7 @@ class LineReader final : public ByteHandler {
   // Whether the last byte of the input completes an answer, when no answer was complete before.
   [[nodiscard]] bool endsAnswer() const;
   ByteHandlerResult collect(std::uint8_t byte);
+  void dropOldestByte();
   void noteSurplus();
   void dropLateAnswer();
 

@@ -200,7 +200,8 @@ void SerialServer::serve(Work& work) {
     --work.retries;
     // A read is repeated only after a timeout: otherwise bytes of its answer are gone, and another
     // read would return the rest with status 0.
-    work.continues = isRead && reader_.tryContinue(work.retries > 0);
+    work.continues =
+        isRead && work.status == serialServerStatusTimeout && reader_.tryContinue(work.retries > 0);
     if (isRead && !work.continues) return;
   }
 }

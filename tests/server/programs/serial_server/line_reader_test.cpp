@@ -251,6 +251,21 @@ TEST_F(LineReaderTest, AReadThatTimedOutCanBeContinuedRepeatedly) {
   EXPECT_EQ(end().bytes, "d\r");
 }
 
+// Before the next attempt of the read, or while it begins.
+TEST_F(LineReaderTest, ALateAnswerToAReadThatIsTooLongOverflows) {
+  for (const bool isEarly : {true, false}) {
+    beginRead(false, 0, true);
+    EXPECT_EQ(end(SerialPortStatus::timeout).bytes, "");
+    if (isEarly) receive("123456789\r");
+    ASSERT_TRUE(reader_.tryContinue(false));
+    if (!isEarly) receive("123456789\r");
+
+    EXPECT_EQ(reader_.readBegins(), ByteHandlerResult::endRead);
+
+    EXPECT_TRUE(end().overflow);
+  }
+}
+
 TEST_F(LineReaderTest, TheNextRequestReadsWhatFollowsAReadThatTimedOut) {
   beginRead(false, 0, true);
   receive("abcdef");
