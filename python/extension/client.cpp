@@ -81,7 +81,9 @@ nb::object PyRequest::result(bool check) {
 
 // The exchange has ended.
 nb::object PyRequest::finish(bool check) {
-  if (exchange_.reply) reply_ = toPython(Message(std::move(exchange_.reply)));
+  if (exchange_.reply)
+    reply_ = toPython(connection_->isClosed() ? std::move(exchange_.reply)
+                                              : connection_->requester()->takeReply(exchange_));
   if (reply_.is_valid()) return checked(connection_->server, reply_, {type_, check});
   if (deadline_.hasPassed() && exchange_.fate == Fate::outcomeUnknown)
     raiseTimedOut(connection_->server);

@@ -85,6 +85,21 @@ void Connection::connect(Requester& requester, Deadline deadline) {
   if (wasInterrupted) throw nb::python_error();
 }
 
+// Sends by `attempt`. If replies that the program has not waited for may take the room, it takes
+// them and tries once more.
+template <class Attempt>
+SendResult Connection::sendWithRoom(Requester& requester, const Attempt& attempt) {
+  const auto result = attempt();
+  if (result != SendResult::queueFull && result != SendResult::tooManyOutstanding &&
+      result != SendResult::noMemory)
+    return result;
+  {
+    const WithoutGil unlocked;
+    requester.takeArrived();
+  }
+  return attempt();
+}
+
 void Connection::send(PyMessage& message, Exchange& exchange, Deadline deadline,
                       Deadline connectBefore, Retry retry) {
   for (;;) {
@@ -92,7 +107,10 @@ void Connection::send(PyMessage& message, Exchange& exchange, Deadline deadline,
     connect(*requester, connectBefore);
     auto& client = requester->client();
     auto sent = message.toMessage(Allocator(client));
-    const auto result = requester->send(std::move(sent), exchange, deadline, retry);
+    const auto result = sendWithRoom(*requester, [&] {
+      // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
+      return requester->send(std::move(sent), exchange, deadline, retry);
+    });
     if (result == SendResult::sent) return;
     // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
     const auto bytes = sent.body().size();
@@ -110,9 +128,15 @@ std::size_t Connection::sendMany(std::span<PyMessage* const> messages,
     connect(*requester, connectBefore);
     auto& client = requester->client();
     OutgoingMessages outgoing(messages, Allocator(client));
-    const auto sent = requester->sendMany(outgoing.messages(), exchanges, deadline);
-    if (sent.count != 0) return sent.count;
-    raiseUnlessLost(client, sent.result, outgoing.messages().front().body().size(), connectBefore);
+    std::size_t count = 0;
+    const auto result = sendWithRoom(*requester, [&] {
+      const auto sent = requester->sendMany(outgoing.messages().subspan(count),
+                                            exchanges.subspan(count), deadline);
+      count += sent.count;
+      return sent.result;
+    });
+    if (count != 0) return count;
+    raiseUnlessLost(client, result, outgoing.messages().front().body().size(), connectBefore);
   }
 }
 

@@ -46,6 +46,8 @@ struct Connection {
   void raiseUnlessLost(MessageClient& client, SendResult result, std::size_t bytes,
                        Deadline connectBefore) const;
   static void connect(Requester& requester, Deadline deadline);
+  template <class Attempt>
+  static SendResult sendWithRoom(Requester& requester, const Attempt& attempt);
   const int forks_;  // of this process, when it was made
   // Null: closed. The GIL guards it; the last call that uses the requester destroys it.
   std::shared_ptr<Requester> requester_;

@@ -11,6 +11,9 @@ namespace mpf::python {
 namespace {
 
 constexpr int kLastLooks = 32;  // calls of runOnce() for a request whose time has passed
+// Replies in the memory of the connection that may wait for the program; further ones are copied.
+// This memory has few chunks: see ServerOptions::queueSize.
+constexpr int kMostBorrowed = 32;
 
 }  // namespace
 
@@ -54,8 +57,7 @@ void Requester::takeAnswer(Exchange& exchange, Message&& message) {
     if (!exchange.hasEnded()) exchange.fate = fate->fate;
   } else if ((message.route().flags & kEndsRequest) != 0) {
     if (!exchange.hasEnded()) {
-      exchange.reply = std::move(message);
-      exchange.hasReply = true;
+      keepReply(exchange, std::move(message));
     }
   } else if (exchange.limit > 0) {
     if (exchange.further.size() == exchange.limit) {
@@ -65,6 +67,25 @@ void Requester::takeAnswer(Exchange& exchange, Message&& message) {
     exchange.further.push_back(std::move(message));
   }
   if (keepsEvents_) events_.push_back(exchange.id);
+}
+
+void Requester::keepReply(Exchange& exchange, Message&& reply) {
+  exchange.isBorrowed = !reply.isInline();
+  if (exchange.isBorrowed && borrowed_ >= kMostBorrowed) {
+    try {
+      reply = reply.duplicate();
+      exchange.isBorrowed = false;
+    } catch (const std::bad_alloc&) {  // the reply stays where it is
+    }
+  }
+  if (exchange.isBorrowed) ++borrowed_;
+  exchange.reply = std::move(reply);
+  exchange.hasReply = true;
+}
+
+void Requester::freeReply(Exchange& exchange) noexcept {
+  if (exchange.isBorrowed) --borrowed_;
+  exchange.isBorrowed = false;
 }
 
 void Requester::takeConnect(const Connect& connect) {
@@ -78,11 +99,12 @@ void Requester::takeConnect(const Connect& connect) {
 
 // ---- waiting
 
-void Requester::runDispatcher(std::unique_lock<std::mutex>& lock, Deadline deadline) {
+template <class Run>
+void Requester::runDispatcher(std::unique_lock<std::mutex>& lock, const Run& run) {
   isRunning_ = true;
   lock.unlock();
   try {
-    dispatcher_.runOnce(deadline);
+    run();
   } catch (...) {
     lock.lock();
     isRunning_ = false;
@@ -108,8 +130,8 @@ bool Requester::wait(const Done& isDone, Deadline deadline, const IsInterrupted&
       continue;  // it may be done now
     }
     const auto end = std::min(deadline, look);
-    if (isRunning_ || lastLooks_ > 0) changed_.wait_for(lock, end.left());
-    else runDispatcher(lock, end);
+    if (isRunning_ || turns_ > 0) changed_.wait_for(lock, end.left());
+    else runDispatcher(lock, [&] { dispatcher_.runOnce(end); });
   }
   return true;
 }
@@ -133,22 +155,39 @@ void Requester::waitForEnd(Exchange& exchange, Deadline deadline,
     exchange.fate = deadline.hasPassed() && !isClosed_ ? Fate::outcomeUnknown : Fate::cancelled;
 }
 
+// A thread that runs the dispatcher at once; the thread that ran it waits until the turn ends.
+class Requester::Turn {
+ public:
+  template <class Done>
+  Turn(Requester& of, std::unique_lock<std::mutex>& lock, const Done& isDone) : self_(of) {
+    ++self_.turns_;
+    if (self_.isRunning_) self_.dispatcher_.interrupt();
+    self_.changed_.wait(lock, [&] { return !self_.isRunning_ || isDone(); });
+  }
+  ~Turn() {
+    --self_.turns_;
+    self_.changed_.notify_all();
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  Requester& self_;
+};
+
 // Delivers `expired` if the server has not taken the request.
 void Requester::lookOnceMore(std::unique_lock<std::mutex>& lock, const Exchange& exchange) {
-  struct Turn {
-    explicit Turn(Requester& of) : self(of) { ++self.lastLooks_; }
-    ~Turn() {
-      --self.lastLooks_;
-      self.changed_.notify_all();
-    }
-    Requester& self;
-  };
-  const Turn turn(*this);
-  if (isRunning_) dispatcher_.interrupt();
-  changed_.wait(lock, [&] { return !isRunning_ || exchange.hasEnded(); });
+  const Turn turn(*this, lock, [&] { return exchange.hasEnded(); });
   // Messages come before requests that expire, and an interrupt may end one call.
   for (int looks = 0; looks < kLastLooks && !exchange.hasEnded(); ++looks)
-    runDispatcher(lock, Deadline::atNs(0));
+    runDispatcher(lock, [this] { dispatcher_.runOnce(Deadline::atNs(0)); });
+}
+
+void Requester::takeArrived() {
+  std::unique_lock lock(mutex_);
+  if (keepsEvents_ || isClosed_) return;
+  const Turn turn(*this, lock, [] { return false; });
+  runDispatcher(lock, [this] { dispatcher_.runPending(); });
 }
 
 Message Requester::waitForFurther(Exchange& exchange, Deadline deadline,
@@ -164,6 +203,12 @@ Message Requester::takeFurther(Exchange& exchange) {
   auto message = std::move(exchange.further.front());
   exchange.further.pop_front();
   return message;
+}
+
+Message Requester::takeReply(Exchange& exchange) {
+  const std::lock_guard lock(mutex_);
+  freeReply(exchange);
+  return std::move(exchange.reply);
 }
 
 // ---- requests
@@ -209,6 +254,7 @@ void Requester::cancel(Exchange& exchange) { client_.cancel(exchange.id); }
 void Requester::forget(Exchange& exchange) {
   const std::lock_guard lock(mutex_);
   exchanges_.erase(exchange.id);
+  freeReply(exchange);
   exchange.isDisconnected = true;
   if (exchange.hasEnded()) return;
   exchange.fate = Fate::cancelled;

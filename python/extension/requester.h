@@ -31,6 +31,7 @@ struct Exchange {
   std::uint32_t id = 0;  // 0: not sent, or sent again under another number
   Message reply;
   bool hasReply = false;  // also after `reply` was moved out
+  bool isBorrowed = false;  // the body of `reply` is in the memory of the connection
   std::optional<Fate> fate;
   // Further replies wait here, at most `limit`; then the oldest is dropped and counted in `missed`.
   std::deque<Message> further;
@@ -61,6 +62,9 @@ class Requester {
   // of those that were sent must live until forget().
   SentMany sendMany(std::span<Message> messages, std::span<Exchange* const> exchanges,
                     Deadline takeBefore);
+  // Handles what has arrived, without waiting for more: a program that sends and never waits needs
+  // it to get room for further requests. Without effect if an event loop does it.
+  void takeArrived();
   // Waits until `exchange` has ended. After the deadline it ends as `expired` or `outcomeUnknown`,
   // after an interruption as `cancelled`.
   void waitForEnd(Exchange& exchange, Deadline deadline, const IsInterrupted& isInterrupted);
@@ -69,6 +73,8 @@ class Requester {
   Message waitForFurther(Exchange& exchange, Deadline deadline, const IsInterrupted& isInterrupted);
   // Returns the next further reply of `exchange`, or an empty handle.
   Message takeFurther(Exchange& exchange);
+  // Returns the reply of `exchange`, which has ended with one.
+  Message takeReply(Exchange& exchange);
   [[nodiscard]] bool hasEnded(const Exchange& exchange);
   [[nodiscard]] bool isDisconnected(const Exchange& exchange);
   [[nodiscard]] std::uint64_t missed(const Exchange& exchange);
@@ -93,18 +99,23 @@ class Requester {
  private:
   void take(Message&& message);
   void takeAnswer(Exchange& exchange, Message&& message);
+  void keepReply(Exchange& exchange, Message&& reply);
+  void freeReply(Exchange& exchange) noexcept;
   void takeConnect(const Connect& connect);
   template <class Done>
   bool wait(const Done& isDone, Deadline deadline, const IsInterrupted& isInterrupted);
-  void runDispatcher(std::unique_lock<std::mutex>& lock, Deadline deadline);
+  template <class Run>
+  void runDispatcher(std::unique_lock<std::mutex>& lock, const Run& run);
+  class Turn;
   void lookOnceMore(std::unique_lock<std::mutex>& lock, const Exchange& exchange);
 
   Dispatcher dispatcher_;
   std::mutex mutex_;  // guards all below
   std::condition_variable changed_;  // an exchange has changed, or no thread runs the dispatcher
   bool isRunning_ = false;  // a thread runs the dispatcher
-  int lastLooks_ = 0;  // threads in lookOnceMore(), which run it before those that wait
+  int turns_ = 0;  // threads with a Turn, which run it before those that wait
   std::unordered_map<std::uint32_t, Exchange*> exchanges_;
+  int borrowed_ = 0;  // replies in exchanges whose memory is that of the connection
   std::vector<std::uint32_t> events_;
   bool keepsEvents_ = false;
   bool isClosed_ = false;

@@ -67,6 +67,91 @@ def test_nothing_is_sent_when_one_of_many_cannot_be(short: tuple[mpf.Server, mpf
     assert server._receive(0) is None
 
 
+def reply_to_all(server: mpf.Server) -> None:
+    while (request := server._receive(0)) is not None:
+        server.reply(request, request)
+
+
+def test_a_client_that_does_not_wait_for_replies_may_send_on(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, client = short
+    requests: list[mpf.Request] = []
+    for number in range(0, 100, 4):
+        requests.append(client.send(mpf.Int32(number)))
+        requests += client.send_many(mpf.Int32(number + i) for i in (1, 2, 3))
+        reply_to_all(server)
+
+    assert [getattr(request.wait(), "value") for request in requests] == list(range(100))
+
+
+def test_waiting_replies_leave_room_for_others(doubler: mpf.Server) -> None:
+    """Larger replies than those of 24 bytes need memory of the connection."""
+    requests: list[mpf.Request] = []
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
+        for _ in range(20):
+            requests += client.send_many([mpf.Float64Array([0.5] * 100)] * 180)
+            requests[-1].wait()
+
+        assert {getattr(request.wait(), "value").sum() for request in requests} == {100.0}
+
+
+def test_requests_that_the_program_dropped_take_no_room(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, client = short
+    for number in range(100):
+        client.send(mpf.Int32(number))
+        reply_to_all(server)
+
+    assert getattr(client.send(mpf.Int32(100)), "id") > 100
+
+
+def test_a_client_that_does_not_wait_goes_on_with_the_next_server(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, client = short
+    lost = client.send_many([mpf.Int32()] * 5)
+    server.close()
+    with mpf.Server("short") as second:
+        second.on(mpf.Int32)(lambda request: request.value + 1)
+        second.start()
+
+        assert getattr(client.send(mpf.Int32(3)).wait(), "value") == 4
+    for request in lost:
+        with pytest.raises(mpf.NeverTaken):
+            request.wait()
+
+
+def test_many_requests_use_the_room_of_waiting_replies(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, client = short
+    requests: list[mpf.Request] = []
+    for _ in range(2):  # twice the size of the queue may have no reply
+        requests += client.send_many([mpf.Int32(1)] * 4)
+        reply_to_all(server)
+
+    requests += client.send_many([mpf.Int32(2)] * 5)
+
+    assert len(requests) == 13
+
+
+async def test_a_coroutine_that_does_not_wait_for_replies_may_send_on(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, _ = short
+    requests: list[mpf.AsyncRequest] = []
+    async with mpf.AsyncClient("short", timeout=PATIENCE) as client:
+        await connect(client, server)
+        for number in range(100):
+            requests += await client.send_many([mpf.Int32(number)])
+            reply_to_all(server)
+
+        values = [getattr(await request.wait(), "value") for request in requests]
+    assert values == list(range(100))
+
+
 def test_many_requests_need_a_connection() -> None:
     with mpf.Client("nobody") as client:
         assert client.send_many([]) == []

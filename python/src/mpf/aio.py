@@ -17,7 +17,7 @@ from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
 from mpf.aio_requests import CONNECTION, AsyncRequest, AsyncSubscription
 from mpf.client import LIMIT
-from mpf.errors import NotConnected
+from mpf.errors import NotConnected, QueueFull
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -297,6 +297,7 @@ class AsyncClient(_mpf.BaseClient):
     async def _sent(self, send: Callable[..., S], what: Any, limit: float, **options: Any) -> S:
         """Calls `send` with these arguments as soon as the client is connected."""
         loop = self._attach()
+        has_drained = False
         while True:
             left = limit - loop.time()
             try:
@@ -304,6 +305,11 @@ class AsyncClient(_mpf.BaseClient):
             except NotConnected:
                 if left <= 0 or not await self.wait_connected(left):
                     raise
+            except QueueFull:  # perhaps of replies that the loop has not seen yet
+                if has_drained:
+                    raise
+                has_drained = True
+                self._drain()
             else:
                 self._set_timer()
                 return sent

@@ -104,7 +104,8 @@ class Client(_mpf.BaseClient):
         retry: bool = False,
         further: int = 0,
     ) -> Request:
-        """Sends a request, and returns it without waiting for its reply.
+        """Sends a request, and returns it without waiting for its reply. A Request that the program
+        drops is cancelled.
 
         further: the number of further replies to the request that may wait for the program.
 
@@ -123,9 +124,10 @@ class Client(_mpf.BaseClient):
         """Sends requests in order, until one cannot be sent, and returns those that were sent. A
         sleeping server is woken at most once.
 
-        The list is shorter than `messages` if for example the queue of the server is full: send the
-        rest again. If not even the first request was sent, this raises the reason, as send() does.
-        Messages that were not sent, including loaned arrays, are unchanged.
+        The list is shorter than `messages` if for example the queue of the server is full: wait for
+        the oldest request, then send the rest again. If not even the first request was sent, this
+        raises the reason, as send() does. Messages that were not sent, including loaned arrays, are
+        unchanged.
 
         The arguments are those of send(), for each request. No request is resent automatically.
         """
