@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import re
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from conftest import PATIENCE, may_fork_beside_threads
+from conftest import PATIENCE, may_fork_beside_threads, needs_mpf
 
 import mpf
 
@@ -105,6 +107,221 @@ def test_a_program_may_end_while(ending: str, silent: mpf.Server, backplane: str
     assert run(start + "\n".join(lines) + '\nprint("end")\n', backplane) == "end\n" or (
         "sys.exit" in ENDS[ending]
     )
+
+
+def prepared(body: str) -> str:
+    """A program with a server "ended", whose handlers begin with `started()`."""
+    return f"""
+import asyncio, os, signal, sys, threading, time, mpf
+server = mpf.Server("ended")
+begun = threading.Event()
+def started():
+    print("started", flush=True)
+    begun.set()
+{body}
+"""
+
+
+FINISHES = """
+@server.on(mpf.Int32)
+def finish(request):
+    started()
+    while not server._isFinishing:
+        time.sleep(0.001)
+    return request.value
+"""
+FINISHES_LATER = """
+@server.on(mpf.Int32)
+async def finish(request):
+    started()
+    while not server._isFinishing:
+        await asyncio.sleep(0.001)
+    await asyncio.sleep(0.001)
+    return request.value
+"""
+NEVER_ENDS = """
+@server.on(mpf.Int32)
+def wait(request):
+    started()
+    time.sleep(1e6)
+"""
+
+
+@pytest.fixture
+def program() -> Iterator[Callable[[str], subprocess.Popen[str]]]:
+    """Starts programs of Python, which end with the test."""
+    with contextlib.ExitStack() as stack:
+
+        def start(text: str) -> subprocess.Popen[str]:
+            process = subprocess.Popen(
+                [sys.executable, "-X", "faulthandler", "-c", text],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            stack.enter_context(process)
+            stack.callback(process.kill)
+            return process
+
+        yield start
+
+
+def line_of(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+@pytest.mark.parametrize("handler", [FINISHES, FINISHES_LATER])
+def test_sigterm_lets_handlers_reply_and_ends_run(
+    handler: str, program: Callable[[str], subprocess.Popen[str]]
+) -> None:
+    process = program(prepared(handler + "server.run()\nprint('end')"))
+    with mpf.Client("ended", timeout=PATIENCE) as client:
+        request = client.send(mpf.Int32(5))
+        assert line_of(process) == "started\n"
+        process.terminate()
+
+        assert getattr(request.wait(), "value") == 5
+        assert process.wait() == 0
+    assert line_of(process) == "end\n"
+
+
+def test_ctrl_c_ends_a_handler_and_run(program: Callable[[str], subprocess.Popen[str]]) -> None:
+    process = program(
+        prepared(
+            "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+            f"{NEVER_ENDS}server.run()\nprint('end')"
+        )
+    )
+    with mpf.Client("ended", timeout=PATIENCE) as client:
+        request = client.send(mpf.Int32(5))
+        assert line_of(process) == "started\n"
+        process.send_signal(signal.SIGINT)
+
+        with pytest.raises(mpf.Refused):
+            request.wait()
+        assert process.wait() == 0
+    assert line_of(process) == "end\n"
+
+
+def test_sigterm_ends_generators(program: Callable[[str], subprocess.Popen[str]]) -> None:
+    process = program(
+        prepared(
+            """
+@server.on(mpf.Int32)
+async def count(request):
+    try:
+        while True:
+            yield 1
+            await asyncio.sleep(1e6)
+    finally:
+        print("closed")
+server.run()
+"""
+        )
+    )
+    with mpf.Client("ended") as client:
+        next(client.subscribe(mpf.Int32(), timeout=PATIENCE))
+        process.terminate()
+
+        assert process.wait() == 0
+    assert line_of(process) == "closed\n"
+
+
+def test_a_second_sigterm_ends_the_process(
+    program: Callable[[str], subprocess.Popen[str]],
+) -> None:
+    process = program(
+        prepared(
+            """
+@server.on(mpf.Int32)
+def stuck(request):
+    started()
+    while server._isFinishing is False:
+        time.sleep(0.001)
+    started()
+    time.sleep(1e6)
+server.run()
+"""
+        )
+    )
+    with mpf.Client("ended", timeout=PATIENCE) as client:
+        request = client.send(mpf.Int32(), timeout=PATIENCE)
+        for _ in range(2):
+            assert line_of(process) == "started\n"
+            process.terminate()
+        assert process.wait() == -signal.SIGTERM
+        with pytest.raises(mpf.OutcomeUnknown):
+            request.wait()
+
+
+def test_a_program_keeps_its_handler_of_sigterm(
+    program: Callable[[str], subprocess.Popen[str]],
+) -> None:
+    process = program(
+        prepared(
+            "signal.signal(signal.SIGTERM, lambda *_: sys.exit(9))\n"
+            f"{NEVER_ENDS}server.run()"
+        )
+    )
+    with mpf.Client("ended", timeout=PATIENCE) as client:
+        client.send(mpf.Int32())
+        assert line_of(process) == "started\n"
+        process.terminate()
+        assert process.wait() == 9
+
+
+@needs_mpf
+@pytest.mark.parametrize("end", ["", "sys.exit(0)", "del server"])
+def test_a_program_that_ends_closes_its_servers(
+    end: str, program: Callable[[str], subprocess.Popen[str]]
+) -> None:
+    process = program(
+        prepared(
+            f"""
+other = mpf.Server("other")
+server.on(mpf.Int32)(lambda request: 5)
+server.start()
+with mpf.Client("ended", timeout={PATIENCE}) as client:
+    client.int32()
+{end}
+"""
+        )
+    )
+    assert process.wait() == 0
+    assert mpf.servers() == []
+
+
+@may_fork_beside_threads
+def test_the_child_of_a_handler_may_exit(program: Callable[[str], subprocess.Popen[str]]) -> None:
+    process = program(
+        prepared(
+            """
+@server.on(mpf.Int32)
+def fork(request):
+    child = os.fork()
+    if child == 0:
+        sys.exit(7)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+server.run()
+"""
+        )
+    )
+    with mpf.Client("ended", timeout=PATIENCE) as client:
+        assert client.int32().value == 7
+    process.terminate()
+    assert process.wait() == 0
+
+
+def test_a_program_ends_while_a_handler_of_its_server_does_not(
+    program: Callable[[str], subprocess.Popen[str]],
+) -> None:
+    process = program(prepared(f"{NEVER_ENDS}server.start()\nbegun.wait()"))
+    with mpf.Client("ended", timeout=PATIENCE) as client:
+        request = client.send(mpf.Int32())
+        assert line_of(process) == "started\n"
+        process.wait()
+        with pytest.raises(mpf.OutcomeUnknown):
+            request.wait()
 
 
 FORKS = """

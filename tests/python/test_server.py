@@ -201,6 +201,16 @@ def test_a_server_runs_once_at_a_time(server: mpf.Server) -> None:
 def test_only_messages_have_handlers(server: mpf.Server) -> None:
     with pytest.raises(TypeError, match="int"):
         server.on(int)  # type: ignore[type-var]
+    with pytest.raises(TypeError, match="5 is not a function"):
+        server.on(mpf.Int32)(5)  # type: ignore[type-var]
+
+
+def test_a_handler_replaces_the_earlier_one(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: 1)
+    with server.start():
+        assert getattr(call(mpf.Int32()), "value") == 1
+        server.on(mpf.Int32)(lambda request: 2)
+        assert getattr(call(mpf.Int32()), "value") == 2
 
 
 def test_a_generator_without_values_refuses_the_request(server: mpf.Server) -> None:

@@ -147,6 +147,62 @@ def test_an_async_generator_that_waits_ends_with_its_client(server: mpf.Server) 
         assert ended.acquire(timeout=PATIENCE)
 
 
+@pytest.mark.parametrize("error", [SystemExit("ends"), KeyboardInterrupt()])
+@pytest.mark.parametrize("isCoroutine", [False, True])
+def test_a_handler_that_ends_the_thread_of_a_server_closes_it(
+    server: mpf.Server,
+    caplog: pytest.LogCaptureFixture,
+    error: BaseException,
+    isCoroutine: bool,
+) -> None:
+    if isCoroutine:
+
+        @server.on(mpf.Int32)
+        async def end(request: mpf.Int32) -> None:
+            raise error
+    else:
+
+        @server.on(mpf.Int32)
+        def end(request: mpf.Int32) -> None:
+            raise error
+
+    server.start()
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        with pytest.raises(mpf.Refused):
+            client.int32()
+        while client.connected:
+            with pytest.raises(mpf.Error):
+                client.int32(timeout=0.01)
+    server.close()
+
+    assert "the server is closed" in caplog.text
+    assert f"in end\n    raise error\n{type(error).__name__}" in caplog.text
+
+
+def test_a_handler_that_exits_ends_run(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: sys.exit(7))
+
+    with concurrent.futures.ThreadPoolExecutor() as threads:
+        asking = threads.submit(call, mpf.Int32())
+        with pytest.raises(SystemExit):
+            server.run()
+        assert isinstance(asking.exception(), mpf.Refused)
+
+
+def test_start_refuses_a_server_that_runs(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: 5)
+    running = threading.Thread(target=server.run)
+    running.start()
+    call(mpf.Int32())
+
+    with pytest.raises(RuntimeError, match="runs already"):
+        server.start()
+
+    assert call(mpf.Int32()) == 5
+    server.close()
+    running.join()
+
+
 def test_a_message_without_a_class_is_refused(server: mpf.Server, backplane: str) -> None:
     """Any program of the host may send one. The peer builds it byte by byte."""
     sys.path.insert(0, str(LAYOUT))

@@ -47,7 +47,7 @@ from ophyd_async.core import (
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message
 from mpf.aio import AsyncClient
 from mpf.errors import Error, StatusError
-from mpf.server import fields_of
+from mpf.replies import fields_of
 
 __all__ = [
     "MpfCommandBackend",

@@ -36,8 +36,11 @@ from types import AsyncGeneratorType, GeneratorType, TracebackType
 from typing import Any, TypeVar, cast
 
 from mpf import _mpf
-from mpf._mpf import Char8Array, Message
-from mpf.errors import Error, QueueFull, StatusError
+from mpf._mpf import Message
+from mpf.ending import at_sigterm, close_at_exit
+from mpf.errors import Error, QueueFull
+from mpf.replies import NoMoreReplies, of_error, with_value
+from mpf.streams import Streams
 
 M = TypeVar("M", bound=Message)
 Self = TypeVar("Self")
@@ -45,9 +48,8 @@ Handler = Callable[[M], object]
 H = TypeVar("H", bound=Callable[..., object])
 
 _log = logging.getLogger("mpf")
+_NOT_HERE = (Error, RuntimeError)  # the server is closed, or that of a parent process
 _PAUSE = 0.001  # [s] between attempts to send a reply to a full queue
-_LOOK = 0.5  # [s] between looks whether the client of a generator has gone
-_COPIED = ("timeout", "cmd", "address", "extra", "number_retrys", "eom")
 
 
 class Server(_mpf.BaseServer):
@@ -87,12 +89,13 @@ class Server(_mpf.BaseServer):
         self._handlers: dict[type[Message], Callable[[Any], object]] = {}
         self._tasks: set[asyncio.Task[Any]] = set()
         self._closing: set[asyncio.Task[Any]] = set()  # that have called close()
-        self._streams: dict[asyncio.Task[Any], Message] = {}  # generators and their requests
-        self._look: asyncio.TimerHandle | None = None  # at the clients of generators
+        self._streams = Streams()
         self._thread: threading.Thread | None = None
         self._state = threading.Condition()  # guards the next two
         self._runner: threading.Thread | None = None  # run() or serve() is in progress there
         self._closesAtEnd = False
+        self._isFinishing = False  # coroutines end before run() does
+        close_at_exit(self)
 
     def __enter__(self: Self) -> Self:
         return self
@@ -108,38 +111,69 @@ class Server(_mpf.BaseServer):
     def on(self, type: type[M]) -> Callable[[H], H]:
         """Makes a function or a coroutine function the handler of requests of this class.
         With `mpf.Message`, the function handles all requests that have no other handler; without
-        one they are refused."""
+        one they get an error.
 
+        It replaces the handler that the class had, also while the server runs.
+        """
         _check_class(type)
 
         def register(handler: H) -> H:
+            if not callable(handler):
+                raise TypeError(f"on: {handler!r} is not a function")
             self._handlers[type] = handler
             return handler
 
         return register
 
     def run(self) -> None:
-        """Handles requests until interrupt(), close() or Ctrl-C. Coroutines run in an event loop of
-        its own, at the same time; functions run one after the other."""
+        """Handles requests until interrupt() or close(); in the main thread also until SIGTERM or
+        Ctrl-C. Coroutines run in an event loop of its own, at the same time; functions run one
+        after the other.
+
+        At SIGTERM, handlers in progress first end and reply, but generators are closed; a second
+        SIGTERM ends the process. A program that handles SIGTERM itself keeps its handler. Ctrl-C
+        raises KeyboardInterrupt in a function in progress, whose request ends as Refused.
+
+        SystemExit leaves run(); the request of the handler that raised it ends as Refused.
+        """
         try:
-            if any(inspect.iscoroutinefunction(h) or inspect.isasyncgenfunction(h)
-                   for h in self._handlers.values()):
-                asyncio.run(self.serve())
-            else:
-                with self._running():
-                    self._run()
+            with at_sigterm(self._finish):
+                if any(inspect.iscoroutinefunction(h) or inspect.isasyncgenfunction(h)
+                       for h in self._handlers.values()):
+                    asyncio.run(self.serve())
+                else:
+                    with self._running():
+                        self._run()
         except KeyboardInterrupt:
-            pass
+            if threading.current_thread() is not threading.main_thread():
+                raise  # it is not that of Ctrl-C
 
     def start(self: Self) -> Self:
-        """Calls run() in a thread, which close() ends."""
+        """Calls run() in a thread, which close() ends, and the end of the program. The server goes
+        on if the program only drops it.
+
+        A handler that raises SystemExit or KeyboardInterrupt closes the server; the log has the
+        traceback.
+        """
         server = cast(Server, self)
         server._fileno()  # raises if it is closed
         if server._thread is not None:
             raise RuntimeError(f"{server.name}: start() was called before")
-        server._thread = threading.Thread(target=server.run, name=f"mpf {server.name}", daemon=True)
+        if server._runner is not None:
+            raise RuntimeError(f"{server.name}: the server runs already")
+        server._thread = threading.Thread(
+            target=server._run_in_thread, name=f"mpf {server.name}", daemon=True
+        )
         server._thread.start()
         return self
+
+    def _run_in_thread(self) -> None:
+        try:
+            self.run()
+        except BaseException:
+            _log.critical("%s: the server is closed, because run() ended by", self.name,
+                          exc_info=True)
+            self._close()
 
     def close(self) -> None:
         """Ends run() and serve(), and disconnects all clients: waiting requests end as NeverTaken.
@@ -162,8 +196,12 @@ class Server(_mpf.BaseServer):
         self._close()
 
     def _interrupt(self) -> None:
-        with contextlib.suppress(Error):  # it is closed, or that of a parent process
+        with contextlib.suppress(*_NOT_HERE):
             self.interrupt()
+
+    def _finish(self) -> None:
+        self._isFinishing = True
+        self._interrupt()
 
     def publish(self, message: Message, requests: Iterable[M]) -> list[M]:
         """Sends `message` to the clients of all these requests, which read the same memory: for any
@@ -197,6 +235,7 @@ class Server(_mpf.BaseServer):
         finally:
             with self._state:
                 self._runner = None
+                self._isFinishing = False
                 if self._closesAtEnd:
                     self._close()
                 self._state.notify_all()
@@ -210,14 +249,14 @@ class Server(_mpf.BaseServer):
             while not self._take_interrupt():
                 while (request := self._receive(0)) is not None:
                     await self._start(request)
-                self._look_soon()  # a client may have gone
+                self._streams.look_soon()  # a client may have gone
                 await readable.wait()
                 readable.clear()
         finally:
             loop.remove_reader(descriptor)
-            if self._look is not None:
-                self._look.cancel()
-                self._look = None
+            self._streams.stop_looking()
+            if self._isFinishing and (tasks := self._tasks - self._streams.tasks()):
+                await asyncio.wait(tasks)
             for task in self._tasks - self._closing:
                 task.cancel()
             await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -236,10 +275,13 @@ class Server(_mpf.BaseServer):
     def _handle_one(self, request: Message) -> None:
         try:
             self._answer(request, self._handle(request))
-        except _NoMoreReplies:
+        except NoMoreReplies:
             pass
         except Exception as error:
             self._fail(request, error)
+        except BaseException:
+            self._give_up(request)
+            raise
 
     async def _start(self, request: Message) -> None:
         task = asyncio.ensure_future(self._serve_one(request))
@@ -256,43 +298,24 @@ class Server(_mpf.BaseServer):
                 await self._answer_each(request, cast(AsyncGenerator[object], result))
             else:
                 self._answer(request, result)
-        except _NoMoreReplies:
+        except NoMoreReplies:
             pass
         except Exception as error:
             self._fail(request, error)
+        except (SystemExit, KeyboardInterrupt):
+            self._give_up(request)
+            raise
 
     async def _answer_each(self, request: Message, values: AsyncGenerator[object]) -> None:
         hasReplied = False
         async with contextlib.aclosing(values):
-            with self._cancelled_without_client(request):
+            with self._streams.running(lambda: self.is_client_connected(request)):
                 async for value in values:
                     while not self._try_reply(request, value):
                         await asyncio.sleep(_PAUSE)
                     hasReplied = True
         if not hasReplied:
             self.refuse(request)
-
-    @contextlib.contextmanager
-    def _cancelled_without_client(self, request: Message) -> Generator[None]:
-        """Cancels the current task when the client has gone: it may wait for something else."""
-        task = asyncio.current_task()
-        assert task is not None
-        self._streams[task] = request
-        self._look_soon()
-        try:
-            yield
-        finally:
-            del self._streams[task]
-
-    def _look_soon(self) -> None:
-        if self._streams and self._look is None:
-            self._look = asyncio.get_running_loop().call_later(_LOOK, self._look_at_clients)
-
-    def _look_at_clients(self) -> None:
-        self._look = None
-        for task, request in self._streams.items():
-            if not self.is_client_connected(request):
-                task.cancel()
 
     def _handle(self, request: Message) -> object:
         handler = self._handlers.get(type(request)) or self._handlers.get(Message)
@@ -315,8 +338,8 @@ class Server(_mpf.BaseServer):
 
     def _try_reply(self, request: Message, value: object) -> bool:
         """Returns False while the client does not take the earlier replies."""
-        if self._is_interrupted or self._closesAtEnd:
-            raise _NoMoreReplies
+        if self._is_interrupted or self._isFinishing or self._closesAtEnd:
+            raise NoMoreReplies
         try:
             wasSent = self._reply_with(request, value)
         except QueueFull:
@@ -324,7 +347,7 @@ class Server(_mpf.BaseServer):
             if self.is_client_connected(request):
                 return False
         if not wasSent:
-            raise _NoMoreReplies
+            raise NoMoreReplies
         return True
 
     def _reply_with(self, request: Message, value: object) -> bool:
@@ -333,17 +356,16 @@ class Server(_mpf.BaseServer):
             return self.reply(request, request)
         if isinstance(value, Message):
             return self.reply(request, value)
-        return self.reply(request, _like(request, value))
+        return self.reply(request, with_value(request, value))
+
+    def _give_up(self, request: Message) -> None:
+        with contextlib.suppress(*_NOT_HERE):
+            self.refuse(request)
 
     def _fail(self, request: Message, error: Exception) -> None:
         _log.error("%s: %r failed", self.name, request, exc_info=error)
-        if isinstance(error, StatusError):
-            status, text = _status_of(error), error.text
-        else:
-            status, text = -1, f"{type(error).__name__}: {error}"
-        fields: dict[str, Any] = {**fields_of(request), "status": status}
         try:
-            self.reply(request, Char8Array(text.encode("utf-8", "backslashreplace"), **fields))
+            self.reply(request, of_error(request, error))
         except Error as failure:
             _log.error("%s: %s", self.name, failure)
 
@@ -358,31 +380,3 @@ def _current_task() -> asyncio.Task[Any] | None:
         return asyncio.current_task()
     except RuntimeError:  # no event loop runs in this thread
         return None
-
-
-class _NoMoreReplies(Exception):
-    """The client has gone, or the server ends."""
-
-
-def _status_of(error: StatusError) -> int:
-    isStatus = error.status != 0 and -(2**31) <= error.status < 2**31
-    return error.status if isStatus else -1
-
-
-def _like(request: Message, value: object) -> Message:
-    """The request with this value."""
-    kind = cast(Callable[..., Message], type(request))
-    try:
-        return kind(value, **fields_of(request))
-    except TypeError as error:
-        name = type(request).__name__
-        raise TypeError(
-            f"the handler returned {type(value)}, which is not the value of the reply "
-            f"to {name} requests: return a message"
-        ) from error
-
-
-def fields_of(message: Message) -> dict[str, Any]:
-    """The fields that a message has in common with another one of its kind: all but the value, the
-    status and the time stamp."""
-    return {name: getattr(message, name) for name in _COPIED if hasattr(message, name)}

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""What becomes of the value and of the exception of a handler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from mpf._mpf import Char8Array, Message
+from mpf.errors import StatusError
+
+_COPIED = ("timeout", "cmd", "address", "extra", "number_retrys", "eom")
+
+
+class NoMoreReplies(Exception):
+    """The client has gone, or the server ends."""
+
+
+def with_value(request: Message, value: object) -> Message:
+    """The request with this value."""
+    kind = cast(Callable[..., Message], type(request))
+    try:
+        return kind(value, **fields_of(request))
+    except TypeError as error:
+        name = type(request).__name__
+        raise TypeError(
+            f"the handler returned {type(value)}, which is not the value of the reply "
+            f"to {name} requests: return a message"
+        ) from error
+
+
+def of_error(request: Message, error: Exception) -> Char8Array:
+    """The reply to a request whose handler has raised this exception."""
+    if isinstance(error, StatusError):
+        status, text = _status_of(error), error.text
+    else:
+        status, text = -1, f"{type(error).__name__}: {error}"
+    fields: dict[str, Any] = {**fields_of(request), "status": status}
+    return Char8Array(text.encode("utf-8", "backslashreplace"), **fields)
+
+
+def fields_of(message: Message) -> dict[str, Any]:
+    """The fields that a message has in common with another one of its kind: all but the value, the
+    status and the time stamp."""
+    return {name: getattr(message, name) for name in _COPIED if hasattr(message, name)}
+
+
+def _status_of(error: StatusError) -> int:
+    isStatus = error.status != 0 and -(2**31) <= error.status < 2**31
+    return error.status if isStatus else -1
