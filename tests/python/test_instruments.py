@@ -9,7 +9,7 @@ import tty
 from collections.abc import Callable, Iterator
 
 import pytest
-from conftest import PATIENCE, PROGRAMS
+from conftest import PATIENCE, PROGRAMS, Silent
 
 import mpf
 
@@ -51,8 +51,7 @@ def line() -> Iterator[Line]:
 @pytest.fixture
 def meter(line: Line, start: Callable[..., object]) -> Iterator[mpf.Serial]:
     start(PROGRAMS / "mpf-serial-server", "meter", line.device, "--log-level", "error")
-    with mpf.Serial("meter", timeout=PATIENCE) as meter:
-        assert meter.client.wait_connected(PATIENCE)
+    with mpf.Serial("meter", timeout=PATIENCE, queue_timeout=PATIENCE) as meter:
         yield meter
 
 
@@ -89,8 +88,7 @@ def bus(start: Callable[..., object]) -> None:
 
 
 def test_a_gpib_instrument(bus: None) -> None:
-    with mpf.Gpib("GPIB0", 22, timeout=PATIENCE) as meter:
-        assert meter.client.wait_connected(PATIENCE)
+    with mpf.Gpib("GPIB0", 22, timeout=PATIENCE, queue_timeout=PATIENCE) as meter:
         assert meter.query("ID?\n").startswith(b"HP3458A")
         assert 0 <= meter.poll() <= 255
         assert meter.lease(1, "test") > 0
@@ -100,7 +98,25 @@ def test_a_gpib_instrument(bus: None) -> None:
 
 
 def test_an_absent_gpib_instrument_is_an_error(bus: None) -> None:
-    with mpf.Gpib("GPIB0", 5, timeout=PATIENCE) as nobody:
-        assert nobody.client.wait_connected(PATIENCE)
+    with mpf.Gpib("GPIB0", 5, timeout=PATIENCE, queue_timeout=PATIENCE) as nobody:
         with pytest.raises(mpf.InstrumentError, match="no instrument accepts bytes"):
             nobody.write("ID?\n")
+
+
+@pytest.mark.parametrize("act", [lambda meter: meter.query("VOLT?\r"), lambda meter: meter.flush(),
+                                 lambda meter: meter.configure(baud=9600)])
+def test_an_absent_server_is_an_error_whatever_the_instrument_may_take(
+    act: Callable[[mpf.Serial], object],
+) -> None:
+    with mpf.Serial("nobody", timeout=1e6, queue_timeout=0.01) as meter:
+        with pytest.raises(mpf.NotConnected, match="nobody"):
+            act(meter)
+
+
+def test_an_operation_that_waits_for_others_expires(silent: Silent) -> None:
+    with mpf.Serial("silent", timeout=PATIENCE, queue_timeout=PATIENCE) as meter:
+        assert meter.client.wait_connected(PATIENCE)
+        meter.queue_timeout = 0.01
+
+        with pytest.raises((mpf.Expired, mpf.TimedOut)):
+            meter.write("VOLT?\r", timeout=0.01)

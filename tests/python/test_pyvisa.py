@@ -11,8 +11,15 @@ from conftest import PATIENCE, PROGRAMS
 from test_instruments import Line, bus, line
 from pyvisa.constants import StatusCode
 from pyvisa.errors import VisaIOError
+from pyvisa.resources import Resource
 
 __all__ = ["bus", "line"]  # fixtures
+
+
+def never_late(resources: pyvisa.ResourceManager, opened: Resource) -> None:
+    """Waits as long as it must for the server."""
+    opened.timeout = PATIENCE * 1000
+    resources.visalib._sessions[opened.session].instrument.queue_timeout = PATIENCE
 
 
 @pytest.fixture
@@ -29,7 +36,7 @@ def meter(
     start(PROGRAMS / "mpf-serial-server", "voltmeter", line.device, "--log-level", "error")
     meter = resources.open_resource("MPF::voltmeter::INSTR")
     assert isinstance(meter, pyvisa.resources.SerialInstrument)
-    meter.timeout = PATIENCE * 1000
+    never_late(resources, meter)
     meter.read_termination = meter.write_termination = "\r"
     yield meter
     meter.close()
@@ -88,12 +95,13 @@ def test_serial_servers_are_listed(
 def test_a_gpib_instrument(resources: pyvisa.ResourceManager, bus: None) -> None:
     meter = resources.open_resource("MPF::GPIB0::22::INSTR")
     assert isinstance(meter, pyvisa.resources.GPIBInstrument)
-    meter.timeout = PATIENCE * 1000
+    never_late(resources, meter)
     assert meter.query("ID?").startswith("HP3458A")
     assert 0 <= meter.read_stb() <= 255
     meter.assert_trigger()
     meter.close()
     absent = resources.open_resource("MPF::GPIB0::5::INSTR")
+    never_late(resources, absent)
     with pytest.raises(VisaIOError) as failure:
         absent.write("ID?")
     assert failure.value.error_code == StatusCode.error_no_listeners

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import math
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from mpf._mpf import Char8Array, Int32, SerialConfig
+from mpf._mpf import Char8Array, Int32, Message, SerialConfig
 from mpf.client import Client
 from mpf.errors import InstrumentError, InstrumentTimeout
 
@@ -28,8 +28,7 @@ _READ, _WRITE, _WRITE_READ, _POLL, _CLEAR, _TRIGGER = 1, 2, 3, 4, 5, 6
 _FLUSH, _SET_EOM, _MILLISECONDS = 0x10, 0x80, 0x100
 _LEASE, _UNLEASE = 12, 13
 _TIMEOUT = 1  # the status of both servers
-#: How much longer than its timeout an operation may take: those of other clients come before [s].
-PATIENCE = 60.0
+QUEUE_TIMEOUT = 5.0  # [s]
 
 _SERIAL_STATUS = {
     1: "no complete answer in time",
@@ -50,10 +49,15 @@ _GPIB_STATUS = {
 class Instrument:
     """What Serial and Gpib have in common.
 
-    timeout: [s] of operations without their own: how long the instrument may take.
+    timeout: [s] of operations without their own: how long the instrument may take, from the moment
+        at which the server begins the operation.
+    queue_timeout: [s] how much longer an operation may last: for the connection to the server, and
+        for operations of other clients that come before. Without a connection in this time it
+        raises NotConnected; if the server has not begun it when both times have passed, Expired.
 
-    Any thread may use an instrument. Operations raise InstrumentTimeout or InstrumentError, whose
-    `answer` has the bytes that were read, or an exception of Client.call().
+    No operation lasts longer than `timeout` and `queue_timeout` together. Any thread may use an
+    instrument. Operations raise InstrumentTimeout or InstrumentError, whose `answer` has the bytes
+    that were read, or an exception of Client.call().
     """
 
     def __init__(
@@ -64,13 +68,16 @@ class Instrument:
         *,
         backplane: str = "",
         timeout: float = 1.0,
+        queue_timeout: float = QUEUE_TIMEOUT,
         status_texts: dict[int, str],
     ) -> None:
         self.client = Client(server, location, backplane=backplane)
         #: The address on the bus; 0 on a serial line.
         self.address = address
-        #: [s]
+        #: [s] how long the instrument may take
         self.timeout = timeout
+        #: [s] how much longer an operation may last
+        self.queue_timeout = queue_timeout
         self._status_texts = status_texts
 
     def __enter__(self: Self) -> Self:
@@ -89,13 +96,19 @@ class Instrument:
         self.client.close()
 
     def write(self, data: str | bytes, timeout: float | None = None) -> None:
-        """Writes all bytes."""
+        """Writes all bytes.
+
+        timeout: [s] how long the instrument may take to accept them; by default that of the object.
+        """
         self._ask(_WRITE, data, timeout=timeout)
 
     def read(self, size: int = 0, timeout: float | None = None, *, eom: bytes = b"") -> bytes:
-        """Reads until the end of message.
+        """Reads until the end of message, or until `size` bytes have come.
 
-        size: [bytes] at most; 0: as the buffer of the server.
+        size: [bytes] the longest answer; 0: the size of the server's buffer, which an option of the
+            server sets.
+        timeout: [s] how long the instrument may take until the answer is complete; by default that
+            of the object. Then InstrumentTimeout, whose `answer` has the bytes that have come.
         eom: bytes that end the answer, besides what always does.
         """
         return self._ask(_READ, b"", size, timeout, eom).value
@@ -108,7 +121,10 @@ class Instrument:
         *,
         eom: bytes = b"",
     ) -> bytes:
-        """Writes, then reads; nothing comes between."""
+        """Writes, then reads; no operation of another client comes between.
+
+        The arguments are those of read(); `timeout` is for both together.
+        """
         return self._ask(_WRITE_READ, data, size, timeout, eom).value
 
     def _eom_options(self, eom: bytes) -> int:
@@ -131,12 +147,20 @@ class Instrument:
             timeout=max(1, math.ceil(limit * 1000)),
             eom=eom,
         )
-        reply = self.client.call(request, limit + PATIENCE, reply=Char8Array, check=False)
+        reply = self._call(request, limit, reply=Char8Array, check=False)
         assert isinstance(reply, Char8Array)
         if reply.status != 0:
             kind = InstrumentTimeout if reply.status == _TIMEOUT else InstrumentError
             reason = self._status_texts.get(reply.status, f"status {reply.status}")
             raise kind(f"{self.client.server}: {reason}", reply)
+        return reply
+
+
+    def _call(self, request: Message, limit: float, **options: Any) -> Message:
+        # Without a connection, call() raises the reason at once.
+        isConnected = self.client.wait_connected(self.queue_timeout)
+        timeout = limit + self.queue_timeout if isConnected else 0.0
+        reply: Message = self.client.call(request, timeout, **options)
         return reply
 
 
@@ -151,12 +175,14 @@ class Serial(Instrument):
         *,
         backplane: str = "",
         timeout: float = 1.0,
+        queue_timeout: float = QUEUE_TIMEOUT,
     ) -> None:
         super().__init__(
             server,
             location=location,
             backplane=backplane,
             timeout=timeout,
+            queue_timeout=queue_timeout,
             status_texts=_SERIAL_STATUS,
         )
 
@@ -187,7 +213,7 @@ class Serial(Instrument):
             parity=parity,
             flow_control=flow_control,
         )
-        self.client.call(config, PATIENCE, reply=Int32)
+        self._call(config, self.timeout, reply=Int32)
 
     def _eom_options(self, eom: bytes) -> int:
         return _SET_EOM if eom else 0
@@ -204,6 +230,7 @@ class Gpib(Instrument):
         *,
         backplane: str = "",
         timeout: float = 1.0,
+        queue_timeout: float = QUEUE_TIMEOUT,
     ) -> None:
         super().__init__(
             server,
@@ -211,6 +238,7 @@ class Gpib(Instrument):
             location,
             backplane=backplane,
             timeout=timeout,
+            queue_timeout=queue_timeout,
             status_texts=_GPIB_STATUS,
         )
 
