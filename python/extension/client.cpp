@@ -181,7 +181,9 @@ class PyClient {
   }
   nb::object loan(nb::handle type, std::size_t length) {
     const auto requester = connection_->requester();
-    return python::loan(Allocator(requester->client()), type, length);
+    auto& client = requester->client();
+    return python::loan(Allocator(client), type, length,
+                        {connection_->server, client.maxMessageBytes()});
   }
   std::vector<std::uint32_t> runPending() {
     const auto requester = connection_->requester();
@@ -295,7 +297,8 @@ void addClient(nb::module_& module) {
            "Returns an array message of `length` elements in the memory that is shared with the "
            "server, for the program to fill in; its elements are not initialised. Sending it "
            "copies nothing, unless an array of numpy still refers to it.\n\n"
-           "Without a connection, or when the shared memory is full, it is ordinary memory.")
+           "Without a connection, or when the shared memory is full, it is ordinary memory. Raises "
+           "TooLarge if the server, once it is connected, does not accept so large a message.")
       .def("_run_pending", &PyClient::runPending)
       .def("_next_deadline", &PyClient::nextDeadline)
       .def("_fileno", &PyClient::descriptor)

@@ -146,10 +146,9 @@ void Connection::raiseUnlessLost(MessageClient& client, SendResult result, std::
   if (result == SendResult::notConnected && !connectBefore.hasPassed()) return;
   if (result == SendResult::notConnected)
     raiseNotSent(server, result, client.notConnectedBecause());
-  raiseNotSent(server, result,
-               result == SendResult::tooLarge ? std::to_string(bytes) + " bytes, the limit is " +
-                                                    std::to_string(client.maxMessageBytes())
-                                              : std::string());
+  if (result == SendResult::tooLarge)
+    raiseTooLarge(server, "not sent", bytes, client.maxMessageBytes());
+  raiseNotSent(server, result, {});
 }
 
 }  // namespace mpf::python

@@ -90,6 +90,14 @@ void raiseNotSent(const std::string& server, SendResult result, const std::strin
   raise(nameOf(result), sentence(server, text));
 }
 
+void raiseTooLarge(const std::string& server, const char* what, std::uint64_t bytes,
+                   std::uint64_t limit) {
+  raise(nameOf(SendResult::tooLarge),
+        sentence(server, std::string(what) + ": " + toString(SendResult::tooLarge) + ": " +
+                             std::to_string(bytes) + " bytes, the limit is " +
+                             std::to_string(limit)));
+}
+
 void raiseFate(const std::string& server, Fate fate) {
   const auto ending = endingOf(fate);
   raise(ending.name, sentence(server, ending.text));

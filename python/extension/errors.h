@@ -15,6 +15,9 @@ namespace nb = nanobind;
 // All throw nb::python_error. `server` is the name that the text begins with.
 [[noreturn]] void raiseNotSent(const std::string& server, SendResult result,
                                const std::string& details);
+//   what  was refused
+[[noreturn]] void raiseTooLarge(const std::string& server, const char* what, std::uint64_t bytes,
+                                std::uint64_t limit);
 [[noreturn]] void raiseFate(const std::string& server, Fate fate);
 // The deadline of the caller passed after the server had taken the request.
 [[noreturn]] void raiseTimedOut(const std::string& server);

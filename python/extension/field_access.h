@@ -7,7 +7,6 @@
 #include <cctype>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 #include <string>
@@ -30,15 +29,46 @@ inline std::string attributeName(std::string_view field) {
   return name;
 }
 
-// Throws OverflowError, which names the field, unless the number fits.
-template <class Value>
-Value narrow(long long number, const char* field) {
-  if (number < std::numeric_limits<Value>::min() || number > std::numeric_limits<Value>::max()) {
-    PyErr_Format(PyExc_OverflowError, "%s: %lld is not a %d-bit integer", field, number,
-                 static_cast<int>(8 * sizeof(Value)));
-    throw nb::python_error();
-  }
-  return static_cast<Value>(number);
+// ---- the class and the field that an error names
+
+template <class T>
+inline constexpr const char* kClassName = nullptr;
+template <>
+inline constexpr const char* kClassName<Int32> = "Int32";
+template <>
+inline constexpr const char* kClassName<Int32Array> = "Int32Array";
+template <>
+inline constexpr const char* kClassName<Float64> = "Float64";
+template <>
+inline constexpr const char* kClassName<Float64Array> = "Float64Array";
+template <>
+inline constexpr const char* kClassName<Char8Array> = "Char8Array";
+template <>
+inline constexpr const char* kClassName<SerialConfig> = "SerialConfig";
+template <>
+inline constexpr const char* kClassName<OutOfBand> = "OutOfBand";
+template <>
+inline constexpr const char* kClassName<User> = "User";
+
+struct Place {
+  const char* type;
+  const char* field;
+};
+
+// "Int32: value must be an int, not float"
+[[noreturn]] inline void raiseWrongType(const Place& place, const char* expected,
+                                        nb::handle value) {
+  PyErr_Format(PyExc_TypeError, "%s: %s must be %s, not %U", place.type, place.field, expected,
+               nb::object(value.type().attr("__name__")).ptr());
+  throw nb::python_error();
+}
+
+// Replaces the TypeError of a conversion, which names neither.
+[[noreturn]] inline void raiseNotConverted(const Place& place, const char* expected,
+                                           nb::handle value) {
+  if (PyErr_ExceptionMatches(PyExc_TypeError) == 0) throw nb::python_error();
+  PyErr_Clear();
+  raiseWrongType(place, expected, value);
 }
 
 // ---- one field
@@ -49,28 +79,50 @@ inline std::string toAttribute(char value) {
   return value == '\0' ? std::string() : std::string(1, value);
 }
 
-inline void setField(std::int32_t& field, long long value, const char* name) {
-  field = narrow<std::int32_t>(value, name);
-}
-inline void setField(double& field, double value, const char* /*name*/) { field = value; }
-inline void setField(char& field, const std::string& value, const char* name) {
-  if (value.size() > 1) {
-    PyErr_Format(PyExc_ValueError, "%s: '%s' is longer than one letter", name, value.c_str());
+constexpr const char* typeOf(std::int32_t /*field*/) { return "int"; }
+constexpr const char* typeOf(double /*field*/) { return "float"; }
+constexpr const char* typeOf(char /*field*/) { return "str"; }
+
+// Accepts what Python accepts as an index: bool and the integers of numpy, but no float.
+inline void setField(std::int32_t& field, nb::handle value, const Place& place) {
+  const auto index =
+      PyLong_CheckExact(value.ptr()) ? nb::borrow(value) : nb::steal(PyNumber_Index(value.ptr()));
+  if (!index.is_valid()) raiseNotConverted(place, "an int", value);
+  int overflow = 0;
+  const auto number = PyLong_AsLongLongAndOverflow(index.ptr(), &overflow);
+  if (overflow != 0 || number != static_cast<std::int32_t>(number)) {
+    PyErr_Format(PyExc_OverflowError, "%s: %S is not a 32-bit integer", place.field, index.ptr());
     throw nb::python_error();
   }
-  field = value.empty() ? '\0' : value.front();
+  field = static_cast<std::int32_t>(number);
+}
+inline void setField(double& field, nb::handle value, const Place& place) {
+  const auto number = PyFloat_AsDouble(value.ptr());
+  if (number == -1.0 && PyErr_Occurred() != nullptr) raiseNotConverted(place, "a float", value);
+  field = number;
+}
+inline void setField(char& field, nb::handle value, const Place& place) {
+  if (!nb::isinstance<nb::str>(value)) raiseWrongType(place, "a str", value);
+  const auto text = nb::cast<std::string>(value);
+  if (text.size() > 1) {
+    PyErr_Format(PyExc_ValueError, "%s: '%s' is longer than one letter", place.field, text.c_str());
+    throw nb::python_error();
+  }
+  field = text.empty() ? '\0' : text.front();
 }
 template <std::size_t room>
-void setBytes(std::array<char, room>& field, std::int32_t& used, std::string_view value,
-              const char* name) {
-  if (value.size() > room) {
-    PyErr_Format(PyExc_ValueError, "%s: %zd bytes are too long: there is room for %d", name,
-                 static_cast<Py_ssize_t>(value.size()), static_cast<int>(room));
+void setBytes(std::array<char, room>& field, std::int32_t& used, nb::handle value,
+              const Place& place) {
+  if (!nb::isinstance<nb::bytes>(value)) raiseWrongType(place, "bytes", value);
+  const auto bytes = nb::borrow<nb::bytes>(value);
+  if (bytes.size() > room) {
+    PyErr_Format(PyExc_ValueError, "%s: %zd bytes are too long: there is room for %d", place.field,
+                 static_cast<Py_ssize_t>(bytes.size()), static_cast<int>(room));
     throw nb::python_error();
   }
   field = {};
-  std::memcpy(field.data(), value.data(), value.size());
-  used = static_cast<std::int32_t>(value.size());
+  std::memcpy(field.data(), bytes.c_str(), bytes.size());
+  used = static_cast<std::int32_t>(bytes.size());
 }
 
 // What the standard fields are for; the same words for each type.
@@ -102,13 +154,15 @@ void addFields(Class& type) {
     if constexpr (!requires { field.used; }) {
       if (field.name == kUsedBytesOfEom) return;
       const auto member = field.member;
-      using Attribute = decltype(toAttribute(std::declval<T>().*member));
       const auto name = attributeName(field.name);
+      const auto setter =
+          "def " + name + "(self, value: " + typeOf(decltype(T{}.*member){}) + ", /) -> None";
       type.def_prop_rw(
           name.c_str(), [member](const Held& self) { return toAttribute(self.fields.*member); },
-          [member, name](Held& self, Attribute value) {
-            setField(self.fields.*member, value, name.c_str());
+          [member, name](Held& self, nb::handle value) {
+            setField(self.fields.*member, value, {kClassName<T>, name.c_str()});
           },
+          nb::for_setter(nb::arg().none()), nb::for_setter(nb::sig(setter.c_str())),
           describe(field.name));
     }
   };

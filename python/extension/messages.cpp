@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "python/extension/messages.h"
 
-#include <array>
 #include <nanobind/stl/string.h>
 #include <string>
 #include <string_view>
 #include <tuple>
 
+#include "python/extension/elements.h"
+#include "python/extension/errors.h"
 #include "python/extension/field_access.h"
 
 namespace mpf::python {
@@ -14,139 +15,7 @@ namespace {
 
 using nb::literals::operator""_a;
 
-// ---- elements
-
-template <class T>
-constexpr const char* kFormat = "B";
-template <>
-constexpr const char* kFormat<Int32Array> = "i";
-template <>
-constexpr const char* kFormat<Float64Array> = "d";
-
-// The buffer protocol: the elements of a received or loaned message, in place.
-template <class T>
-int getBuffer(PyObject* self, Py_buffer* view, int flags) {
-  auto& array = *nb::inst_ptr<PyArray<T>>(self);
-  view->obj = nullptr;
-  if (array.isEmpty || array.values.is_valid()) {
-    PyErr_SetString(PyExc_BufferError,
-                    array.isEmpty ? "the message was sent" : "use the attribute `value`");
-    return -1;
-  }
-  if ((flags & PyBUF_WRITABLE) != 0 && !array.isLoaned) {
-    PyErr_SetString(PyExc_BufferError, "a received message is read-only");
-    return -1;
-  }
-  using Element = typename T::Element;
-  static Py_ssize_t stride = sizeof(Element);
-  view->buf = const_cast<Element*>(std::as_const(array.handle).template valueAs<T>().data());
-  view->obj = Py_NewRef(self);
-  view->len = array.length * stride;
-  view->itemsize = stride;
-  view->readonly = array.isLoaned ? 0 : 1;
-  view->ndim = 1;
-  view->format = (flags & PyBUF_FORMAT) != 0 ? const_cast<char*>(kFormat<T>) : nullptr;
-  view->shape = (flags & PyBUF_ND) != 0 ? &array.length : nullptr;
-  view->strides = (flags & PyBUF_STRIDES) == PyBUF_STRIDES ? &stride : nullptr;
-  view->suboffsets = nullptr;
-  view->internal = nullptr;
-  ++array.exports;
-  return 0;
-}
-
-template <class T>
-void releaseBuffer(PyObject* self, Py_buffer* /*view*/) {
-  --nb::inst_ptr<PyArray<T>>(self)->exports;
-}
-
-template <class T>
-PyType_Slot kBufferSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(getBuffer<T>)},
-                              {Py_bf_releasebuffer, reinterpret_cast<void*>(releaseBuffer<T>)},
-                              {0, nullptr}};
-
-// What the module uses of numpy.
-enum class Numpy : std::uint8_t { fromBuffer, asContiguousArray, arrayEqual, int32, float64 };
-constexpr std::array kNumpyNames{"frombuffer", "ascontiguousarray", "array_equal", "int32",
-                                 "float64"};
-template <class T>
-constexpr auto kElementType = std::is_same_v<T, Int32Array> ? Numpy::int32 : Numpy::float64;
-
-// Looked up at the first use. Not a static initialiser: a thread that waits for it would hold the
-// GIL, which the import needs.
-nb::handle of(Numpy what) {
-  static std::array<PyObject*, kNumpyNames.size()> found{};
-  const auto index = static_cast<std::size_t>(what);
-  if (found[index] == nullptr)
-    found[index] =
-        nb::object(nb::module_::import_("numpy").attr(kNumpyNames[index])).release().ptr();
-  return found[index];
-}
-
-// The elements as users see them: a numpy array, bytes or a memoryview.
-template <class T>
-nb::object valueOf(nb::handle self) {
-  auto& array = *nb::inst_ptr<PyArray<T>>(self);
-  if (array.isEmpty) throw nb::value_error(kWasSent);
-  if constexpr (CountedInElements<T>) {
-    return array.values.is_valid() ? array.values
-                                   : of(Numpy::fromBuffer)(self, of(kElementType<T>));
-  } else {
-    const auto view = array.values.is_valid() ? array.values : nb::borrow(self);
-    if constexpr (std::is_same_v<T, Char8Array>) {
-      const BufferView bytes(view);
-      return nb::bytes(bytes.bytes().data(), bytes.bytes().size());
-    } else {
-      auto* result = PyMemoryView_FromObject(view.ptr());
-      if (result == nullptr) throw nb::python_error();
-      return nb::steal(result);
-    }
-  }
-}
-
-// The number of elements.
-template <class T>
-std::size_t lengthOf(const PyArray<T>& array) {
-  if (!array.values.is_valid()) return static_cast<std::size_t>(array.length);
-  return BufferView(array.values).bytes().size() / sizeof(typename T::Element);
-}
-
-// Sets the elements of a message that Python creates.
-template <class T>
-void setValues(PyArray<T>& array, nb::handle value) {
-  const CallsPython guard;
-  if constexpr (CountedInElements<T>) {
-    array.values = of(Numpy::asContiguousArray)(value, of(kElementType<T>));
-    if (std::is_same_v<T, Int32Array> && !array.values.is(value) &&
-        !nb::cast<bool>(of(Numpy::arrayEqual)(array.values, value)))
-      throw nb::value_error("the elements are not 32-bit integers");
-    if (nb::cast<int>(array.values.attr("ndim")) != 1)
-      throw nb::value_error("the elements must have one dimension");
-  } else {
-    array.values = nb::isinstance<nb::str>(value) ? value.attr("encode")() : nb::borrow(value);
-    static_cast<void>(lengthOf(array));  // throws unless it has a contiguous buffer
-  }
-}
-
 // ---- classes
-
-template <class T>
-constexpr const char* kClassName = nullptr;
-template <>
-constexpr const char* kClassName<Int32> = "Int32";
-template <>
-constexpr const char* kClassName<Int32Array> = "Int32Array";
-template <>
-constexpr const char* kClassName<Float64> = "Float64";
-template <>
-constexpr const char* kClassName<Float64Array> = "Float64Array";
-template <>
-constexpr const char* kClassName<Char8Array> = "Char8Array";
-template <>
-constexpr const char* kClassName<SerialConfig> = "SerialConfig";
-template <>
-constexpr const char* kClassName<OutOfBand> = "OutOfBand";
-template <>
-constexpr const char* kClassName<User> = "User";
 
 // Calls `act` with std::type_identity<T>, for each type that has a class.
 template <class Act>
@@ -161,14 +30,35 @@ void forEachType(Act&& act) {
       MessageTypes{});
 }
 
+constexpr const char* kFields = "value, timeout, cmd, status, address, extra";
+constexpr const char* kChar8Fields =
+    "value, timeout, cmd, status, address, extra, number_retrys, eom";
+constexpr const char* kConfigFields = "baud, stop_bits, bits_per_char, parity, flow_control";
+
+// The arguments of Python that all classes with these fields have.
+struct StandardFields {
+  nb::handle timeout, cmd, status, address, extra;
+};
+
 template <class T>
-void setStandardFields(T& fields, long long timeout, long long cmd, long long status,
-                       long long address, long long extra) {
-  fields.timeout = narrow<std::int32_t>(timeout, "timeout");
-  fields.cmd = narrow<std::int32_t>(cmd, "cmd");
-  fields.status = narrow<std::int32_t>(status, "status");
-  fields.address = narrow<std::int32_t>(address, "address");
-  fields.extra = narrow<std::int32_t>(extra, "extra");
+void setStandardFields(T& fields, const StandardFields& given) {
+  const auto set = [](std::int32_t& field, nb::handle value, const char* name) {
+    setField(field, value, {kClassName<T>, name});
+  };
+  set(fields.timeout, given.timeout, "timeout");
+  set(fields.cmd, given.cmd, "cmd");
+  set(fields.status, given.status, "status");
+  set(fields.address, given.address, "address");
+  set(fields.extra, given.extra, "extra");
+}
+
+// Names a field that the class does not have.
+void refuseOthers(const nb::kwargs& others, const char* type, const char* fields) {
+  if (others.size() == 0) return;
+  for (const auto [name, value] : others) {
+    PyErr_Format(PyExc_TypeError, "%s has no field \"%U\"; use %s", type, name.ptr(), fields);
+    throw nb::python_error();
+  }
 }
 
 template <ScalarBody T>
@@ -176,22 +66,27 @@ using PyClass = nb::class_<PyScalar<T>, PyMessage>;
 template <ArrayBody T>
 using PyArrayClass = nb::class_<PyArray<T>, PyMessage>;
 
-#define MPF_STANDARD_ARGUMENTS \
-  nb::kw_only(), "timeout"_a = 0, "cmd"_a = 0, "status"_a = 0, "address"_a = 0, "extra"_a = 0
+#define MPF_STANDARD_ARGUMENTS                                                      \
+  nb::kw_only(), "timeout"_a.none() = 0, "cmd"_a.none() = 0, "status"_a.none() = 0, \
+                 "address"_a.none() = 0, "extra"_a.none() = 0
+#define MPF_STANDARD_SIGNATURE \
+  "timeout: int = 0, cmd: int = 0, status: int = 0, address: int = 0, extra: int = 0"
+constexpr const char* kIntSignature =
+    "def __init__(self, value: int = 0, *, " MPF_STANDARD_SIGNATURE ") -> None";
 
 template <class T>
-void addScalar(nb::module_& module, const char* doc) {
+void addScalar(nb::module_& module, const char* doc, const char* initSignature) {
   PyClass<T> type(module, kClassName<T>, doc);
-  using Value = decltype(toAttribute(T{}.value));
   type.def(
       "__init__",
-      [](PyScalar<T>* self, Value value, long long timeout, long long cmd, long long status,
-         long long address, long long extra) {
+      [](PyScalar<T>* self, nb::handle value, nb::handle timeout, nb::handle cmd, nb::handle status,
+         nb::handle address, nb::handle extra, const nb::kwargs& others) {
+        refuseOthers(others, kClassName<T>, kFields);
         new (self) PyScalar<T>;
-        setField(self->fields.value, value, "value");
-        setStandardFields(self->fields, timeout, cmd, status, address, extra);
+        setField(self->fields.value, value, {kClassName<T>, "value"});
+        setStandardFields(self->fields, {timeout, cmd, status, address, extra});
       },
-      "value"_a = 0, MPF_STANDARD_ARGUMENTS);
+      "value"_a.none() = 0, MPF_STANDARD_ARGUMENTS, "others"_a, nb::sig(initSignature));
   addFields<PyScalar<T>, T>(type);
   type.def("__repr__", [](const PyScalar<T>& self) {
     const auto value = nb::repr(nb::cast(toAttribute(self.fields.value)));
@@ -216,22 +111,24 @@ PyArrayClass<T> addArrayClass(nb::module_& module, const char* doc, const char* 
 }
 
 template <class T>
-void addArray(nb::module_& module, const char* doc, const char* valueSignature,
-              const char* initSignature) {
+void addArray(nb::module_& module, const char* doc, const char* valueSignature) {
   auto type =
       addArrayClass<T>(module, doc, valueSignature,
                        "The elements, one dimension. Those of a received message are in "
                        "shared memory and read-only; they stay valid as long as the array.");
   type.def(
       "__init__",
-      [](PyArray<T>* self, nb::handle value, long long timeout, long long cmd, long long status,
-         long long address, long long extra) {
+      [](PyArray<T>* self, nb::handle value, nb::handle timeout, nb::handle cmd, nb::handle status,
+         nb::handle address, nb::handle extra, const nb::kwargs& others) {
+        refuseOthers(others, kClassName<T>, kFields);
         PyArray<T> array;  // nothing destroys *self after an exception
         setValues(array, value);
-        setStandardFields(array.fields, timeout, cmd, status, address, extra);
+        setStandardFields(array.fields, {timeout, cmd, status, address, extra});
         new (self) PyArray<T>(std::move(array));
       },
-      "value"_a = nb::make_tuple(), MPF_STANDARD_ARGUMENTS, nb::sig(initSignature));
+      "value"_a.none() = nb::make_tuple(), MPF_STANDARD_ARGUMENTS, "others"_a,
+      nb::sig("def __init__(self, value: numpy.typing.ArrayLike = (), *, " MPF_STANDARD_SIGNATURE
+              ") -> None"));
 }
 
 void addChar8Array(nb::module_& module) {
@@ -240,31 +137,33 @@ void addChar8Array(nb::module_& module) {
       "A copy of the bytes; memoryview(message) does not copy those of a received message.");
   type.def(
       "__init__",
-      [](PyArray<Char8Array>* self, nb::handle value, long long timeout, long long cmd,
-         long long status, long long address, long long extra, long long retries,
-         const nb::bytes& eom) {
+      [](PyArray<Char8Array>* self, nb::handle value, nb::handle timeout, nb::handle cmd,
+         nb::handle status, nb::handle address, nb::handle extra, nb::handle retries,
+         nb::handle eom, const nb::kwargs& others) {
+        refuseOthers(others, kClassName<Char8Array>, kChar8Fields);
         PyArray<Char8Array> array;
         setValues(array, value);
         auto& fields = array.fields;
-        setStandardFields(fields, timeout, cmd, status, address, extra);
-        fields.numberRetrys = narrow<std::int32_t>(retries, "number_retrys");
-        setBytes(fields.eomString, fields.eomLen, {eom.c_str(), eom.size()}, "eom");
+        setStandardFields(fields, {timeout, cmd, status, address, extra});
+        setField(fields.numberRetrys, retries, {kClassName<Char8Array>, "number_retrys"});
+        setBytes(fields.eomString, fields.eomLen, eom, {kClassName<Char8Array>, "eom"});
         new (self) PyArray<Char8Array>(std::move(array));
       },
-      "value"_a = nb::bytes("", 0), MPF_STANDARD_ARGUMENTS, "number_retrys"_a = 0,
-      "eom"_a = nb::bytes("", 0),
-      nb::sig("def __init__(self, value: str | typing_extensions.Buffer = b'', *, timeout: int = "
-              "0, cmd: int = 0, status: int = 0, address: int = 0, extra: int = 0, "
-              "number_retrys: int = 0, eom: bytes = b'') -> None"));
+      "value"_a.none() = nb::bytes("", 0), MPF_STANDARD_ARGUMENTS, "number_retrys"_a.none() = 0,
+      "eom"_a.none() = nb::bytes("", 0), "others"_a,
+      nb::sig("def __init__(self, value: str | typing_extensions.Buffer = b'', "
+              "*, " MPF_STANDARD_SIGNATURE ", number_retrys: int = 0, eom: bytes = b'') -> None"));
   type.def_prop_rw(
       "eom",
       [](const PyArray<Char8Array>& self) {
         const auto eom = self.fields.eom();
         return nb::bytes(eom.data(), eom.size());
       },
-      [](PyArray<Char8Array>& self, const nb::bytes& eom) {
-        setBytes(self.fields.eomString, self.fields.eomLen, {eom.c_str(), eom.size()}, "eom");
+      [](PyArray<Char8Array>& self, nb::handle eom) {
+        setBytes(self.fields.eomString, self.fields.eomLen, eom, {kClassName<Char8Array>, "eom"});
       },
+      nb::for_setter(nb::arg().none()),
+      nb::for_setter(nb::sig("def eom(self, value: bytes, /) -> None")),
       "The end-of-message string, at most 4 bytes.");
   type.def_prop_ro(
       "text",
@@ -281,12 +180,13 @@ void addUser(nb::module_& module) {
       "The bytes; those of a received message are in shared memory and read-only.");
   type.def(
       "__init__",
-      [](PyArray<User>* self, nb::handle value) {
+      [](PyArray<User>* self, nb::handle value, const nb::kwargs& others) {
+        refuseOthers(others, kClassName<User>, "value");
         PyArray<User> array;
         setValues(array, value);
         new (self) PyArray<User>(std::move(array));
       },
-      "value"_a = nb::bytes("", 0),
+      "value"_a.none() = nb::bytes("", 0), "others"_a,
       nb::sig("def __init__(self, value: typing_extensions.Buffer = b'') -> None"));
 }
 
@@ -296,17 +196,21 @@ void addSerialConfig(nb::module_& module) {
                              "Settings of a serial line. The reply is an Int32.");
   type.def(
       "__init__",
-      [](Config* self, long long baud, long long stopBits, long long bitsPerChar,
-         const std::string& parity, const std::string& flowControl) {
+      [](Config* self, nb::handle baud, nb::handle stopBits, nb::handle bitsPerChar,
+         nb::handle parity, nb::handle flowControl, const nb::kwargs& others) {
+        constexpr auto* kName = kClassName<SerialConfig>;
+        refuseOthers(others, kName, kConfigFields);
         new (self) Config;
-        setField(self->fields.baud, baud, "baud");
-        setField(self->fields.stopBits, stopBits, "stop_bits");
-        setField(self->fields.bitsPerChar, bitsPerChar, "bits_per_char");
-        setField(self->fields.parity, parity, "parity");
-        setField(self->fields.flowControl, flowControl, "flow_control");
+        setField(self->fields.baud, baud, {kName, "baud"});
+        setField(self->fields.stopBits, stopBits, {kName, "stop_bits"});
+        setField(self->fields.bitsPerChar, bitsPerChar, {kName, "bits_per_char"});
+        setField(self->fields.parity, parity, {kName, "parity"});
+        setField(self->fields.flowControl, flowControl, {kName, "flow_control"});
       },
-      nb::kw_only(), "baud"_a = 0, "stop_bits"_a = 0, "bits_per_char"_a = 0, "parity"_a = "",
-      "flow_control"_a = "");
+      nb::kw_only(), "baud"_a.none() = 0, "stop_bits"_a.none() = 0, "bits_per_char"_a.none() = 0,
+      "parity"_a.none() = "", "flow_control"_a.none() = "", "others"_a,
+      nb::sig("def __init__(self, *, baud: int = 0, stop_bits: int = 0, bits_per_char: int = 0, "
+              "parity: str = '', flow_control: str = '') -> None"));
   addFields<Config, SerialConfig>(type);
   type.def("__repr__",
            [](const Config& self) { return describe(kClassName<SerialConfig>, self.fields, ""); });
@@ -355,11 +259,15 @@ nb::object toPython(Message&& message) {
 }
 nb::object tryRequestToPython(Message&& request) { return tryConvert(std::move(request), true); }
 
-nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length) {
+nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length,
+                const SizeLimit& limit) {
   nb::object result;
   forEachType([&]<class T>(std::type_identity<T> /*type*/) {
     if constexpr (ArrayBody<T>) {
       if (!type.is(nb::type<PyArray<T>>())) return;
+      const auto bytes = MessageOf<T>::bytesFor(length);
+      if (limit.bytes != 0 && bytes > limit.bytes)
+        raiseTooLarge(limit.server, "no loan", bytes, limit.bytes);
       PyArray<T> array;
       array.handle = allocator.array<T>(length);
       array.length = static_cast<Py_ssize_t>(length);
@@ -373,25 +281,24 @@ nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length)
 }
 
 void addMessages(nb::module_& module) {
-  nb::class_<PyMessage>(module, "Message", "A message of any type.")
+  nb::class_<PyMessage>(module, "Message",
+                        "A message of any type. Messages compare by identity, so that a server "
+                        "finds the requests that it keeps: compare their fields.")
       .def_rw("time_stamp_ns", &PyMessage::timeStampNs,
               "Of a reply: when its data was taken [ns since 1970, UTC], as the server says; 0: it "
               "does not say. A Server fills in the time at which it replies.");
-  addScalar<Int32>(module, "One 32-bit integer.");
+  addScalar<Int32>(module, "One 32-bit integer.", kIntSignature);
   addArray<Int32Array>(module, "32-bit integers.",
-                       "def value(self) -> numpy.typing.NDArray[numpy.int32]",
-                       "def __init__(self, value: numpy.typing.ArrayLike = (), *, timeout: int = "
-                       "0, cmd: int = 0, status: int = 0, address: int = 0, extra: int = 0) -> "
-                       "None");
-  addScalar<Float64>(module, "One 64-bit floating-point number.");
+                       "def value(self) -> numpy.typing.NDArray[numpy.int32]");
+  addScalar<Float64>(module, "One 64-bit floating-point number.",
+                     "def __init__(self, value: float = 0.0, *, " MPF_STANDARD_SIGNATURE
+                     ") -> None");
   addArray<Float64Array>(module, "64-bit floating-point numbers.",
-                         "def value(self) -> numpy.typing.NDArray[numpy.float64]",
-                         "def __init__(self, value: numpy.typing.ArrayLike = (), *, timeout: int "
-                         "= 0, cmd: int = 0, status: int = 0, address: int = 0, extra: int = 0) "
-                         "-> None");
+                         "def value(self) -> numpy.typing.NDArray[numpy.float64]");
   addChar8Array(module);
   addSerialConfig(module);
-  addScalar<OutOfBand>(module, "As Int32, for messages that a server sends unasked.");
+  addScalar<OutOfBand>(module, "As Int32, for messages that a server sends unasked.",
+                       kIntSignature);
   addUser(module);
 }
 

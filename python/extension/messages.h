@@ -170,6 +170,12 @@ Message PyArray<T>::filled(const Allocator& allocator, std::span<const std::byte
   return message;
 }
 
+// The largest message of a server.
+struct SizeLimit {
+  const std::string& server;
+  std::uint64_t bytes;  // 0: not known
+};
+
 // The object of Python for a received message, which it owns.
 //   throws  nb::python_error; TypeError of a type that Python does not have
 [[nodiscard]] nb::object toPython(Message&& message);
@@ -177,8 +183,10 @@ Message PyArray<T>::filled(const Allocator& allocator, std::span<const std::byte
 // does not have its type, or if its body does not fit the type.
 [[nodiscard]] nb::object tryRequestToPython(Message&& request);
 // An array message in the memory that is shared with the peer, for the program to fill in.
-//   type  mpf.Int32Array, mpf.Float64Array, mpf.Char8Array or mpf.User
-[[nodiscard]] nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length);
+//   type    mpf.Int32Array, mpf.Float64Array, mpf.Char8Array or mpf.User
+//   throws  nb::python_error: TooLarge
+[[nodiscard]] nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length,
+                              const SizeLimit& limit);
 
 // Adds the classes to the module.
 void addMessages(nb::module_& module);

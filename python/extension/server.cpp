@@ -29,14 +29,17 @@ class PyServer {
  public:
   PyServer(const std::string& name, std::optional<std::int32_t> location,
            const std::string& backplane, int queueSize, std::uint64_t maxMessageBytes,
-           int maxBorrowed, const std::string& wait)
-      : name_(name), forks_(forkCount()) {
+           int maxBorrowed, const std::string& wait, std::uint32_t mode,
+           std::optional<std::uint32_t> group)
+      : name_(name), maxMessageBytes_(maxMessageBytes), forks_(forkCount()) {
     ServerOptions options{.queueSize = queueSize,
                           .maxMessageBytes = maxMessageBytes,
                           .waitMode = waitModeOf(wait),
+                          .rights = {.mode = mode},
                           .stampsReplies = true,
                           .maxBorrowed = maxBorrowed};
     if (location) options.location = *location;
+    if (group) options.rights.group = *group;
     server_ = std::make_shared<MessageServer>(Backplane::attach(backplane), name, options);
   }
 
@@ -110,11 +113,12 @@ class PyServer {
   nb::object loan(PyMessage& request, nb::handle type, std::size_t length) {
     const auto server = opened();
     checkRequest(request);
-    return python::loan(Allocator(*server, request.handle), type, length);
+    return python::loan(Allocator(*server, request.handle), type, length,
+                        {name_, maxMessageBytes_});
   }
   nb::object loanShared(nb::handle type, std::size_t length) {
     const auto server = opened();
-    return python::loan(Allocator(*server), type, length);
+    return python::loan(Allocator(*server), type, length, {name_, maxMessageBytes_});
   }
   bool isClientConnected(const PyMessage& request) {
     const auto server = opened();
@@ -183,6 +187,7 @@ class PyServer {
   }
 
   const std::string name_;
+  const std::uint64_t maxMessageBytes_;
   const int forks_;
   std::shared_ptr<MessageServer> server_;  // null: closed
   std::atomic<bool> isInterrupted_ = false;
@@ -194,10 +199,11 @@ void addServer(nb::module_& module) {
   nb::class_<PyServer>(module, "BaseServer", nb::is_weak_referenceable(),
                        "What mpf.Server is made of.")
       .def(nb::init<const std::string&, std::optional<std::int32_t>, const std::string&, int,
-                    std::uint64_t, int, const std::string&>(),
+                    std::uint64_t, int, const std::string&, std::uint32_t,
+                    std::optional<std::uint32_t>>(),
            "name"_a, "location"_a = nb::none(), nb::kw_only(), "backplane"_a = "",
            "queue_size"_a = 100, "max_message_bytes"_a = std::uint64_t{64} << 20,
-           "max_borrowed"_a = 4, "wait"_a = "adaptive")
+           "max_borrowed"_a = 4, "wait"_a = "adaptive", "mode"_a = 0600, "group"_a = nb::none())
       .def("_receive", &PyServer::receive, "timeout"_a,
            nb::sig("def _receive(self, timeout: float) -> Message | None"))
       .def("reply", &PyServer::reply, "request"_a, "message"_a,

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
+from typing import Any
 
+import numpy as np
 import pytest
 from conftest import PATIENCE, PROGRAMS, Silent, again_if_late, needs_mpf
 
@@ -240,6 +243,43 @@ def test_invalid_arguments_are_named() -> None:
         mpf.Client("")
     with mpf.Client("dac", timeout=PATIENCE) as client, pytest.raises(TypeError, match="mpf.Int32"):
         client.call(3)  # type: ignore[type-var]
+
+
+untyped: Any = mpf
+WRONG = {
+    "Int32: value must be an int, not float": lambda: untyped.Int32(1.5),
+    "Int32: value must be an int, not float64": lambda: untyped.Int32(np.float64(2.0)),
+    "Int32: value must be an int, not NoneType": lambda: untyped.Int32(None),
+    "Int32: address must be an int, not str": lambda: untyped.Int32(address="3"),
+    "Float64: value must be a float, not str": lambda: untyped.Float64("x"),
+    "Char8Array: eom must be bytes, not str": lambda: untyped.Char8Array(eom="x"),
+    "SerialConfig: parity must be a str, not int": lambda: untyped.SerialConfig(parity=1),
+    "Float64Array: value must be an array, not int": lambda: untyped.Float64Array(3),
+    "Int32Array: value must be an array, not int32": lambda: untyped.Int32Array(np.int32(3)),
+    'Int32 has no field "adress"; use value, timeout, cmd, status, address, extra':
+        lambda: untyped.Int32(1, adress=3),
+    'User has no field "cmd"; use value': lambda: untyped.User(cmd=1),
+    "Int32: status must be an int, not str": lambda: setattr(mpf.Int32(), "status", "x"),
+    "Char8Array: eom must be bytes, not NoneType": lambda: setattr(mpf.Char8Array(), "eom", None),
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_value_of_the_wrong_type_is_named(text: str) -> None:
+    with pytest.raises(TypeError, match=f"^{re.escape(text)}$"):
+        WRONG[text]()
+
+
+def test_integers_of_other_types_are_values() -> None:
+    assert (mpf.Int32(np.int64(5)).value, mpf.Int32(True).value) == (5, 1)
+    assert (mpf.Float64(3).value, mpf.Float64(np.float32(1.5)).value) == (3.0, 1.5)
+
+
+def test_messages_compare_by_identity() -> None:
+    """A server finds the requests that it keeps: two clients may send equal ones."""
+    first, second = mpf.Int32(3), mpf.Int32(3)
+    assert first != second
+    assert len({first, second}) == 2
 
 
 def test_a_closed_client_raises(doubler: mpf.Server) -> None:

@@ -131,7 +131,8 @@ def test_requests_of_clients_that_have_gone_are_returned(server: mpf.Server) -> 
 def test_an_array_that_is_too_large_is_not_lost(server: mpf.Server) -> None:
     with contextlib.ExitStack() as stack:
         sent, received = subscribe(server, stack)
-        loaned = server.loan_shared(mpf.Float64Array, 1 << 18)
+        larger = stack.enter_context(mpf.Server("larger"))
+        loaned = larger.loan_shared(mpf.Float64Array, 1 << 18)
         loaned.value[:] = 1.0
 
         with pytest.raises(mpf.TooLarge, match="camera"):
