@@ -20,7 +20,7 @@ constexpr int kMostBorrowed = 64;
 
 std::uint32_t checkedMaxBorrowed(int count) {
   if (count < 1 || count > kMostBorrowed) {
-    throw std::invalid_argument(fmt::format("maxBorrowed {}: use 1 to {}", count, kMostBorrowed));
+    throw std::invalid_argument(fmt::format("max borrowed {}: use 1 to {}", count, kMostBorrowed));
   }
   return static_cast<std::uint32_t>(count);
 }

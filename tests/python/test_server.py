@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 import asyncio
+import grp
+import os
+import stat
 import subprocess
 import threading
 import time
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -304,3 +308,46 @@ def test_replies_have_time_stamps(server: mpf.Server) -> None:
         assert client.int32(5).time_stamp_ns == 5
         before = time.time_ns()
         assert before <= client.int32(0).time_stamp_ns <= time.time_ns()
+
+
+def test_a_name_in_use_by_this_process_says_what_frees_it(server: mpf.Server) -> None:
+    with pytest.raises(mpf.NameInUse, match=r"tested: this process .* close\(\) frees the name"):
+        mpf.Server("tested")
+    server.close()
+    mpf.Server("tested").close()
+
+
+def test_mode_and_group_admit_users(backplane: str) -> None:
+    number = max(os.getgroups() or [os.getgid()])
+
+    def rights() -> set[tuple[int, int]]:
+        """Of the segments in shared memory that a client opens for writing."""
+        found = [file.stat() for file in Path("/dev/shm").glob(f"mpf.{backplane}.h.*")]
+        return {(stat.S_IMODE(one.st_mode), one.st_gid) for one in found}
+
+    with mpf.Server("open", mode=0o660, group=grp.getgrgid(number).gr_name):
+        assert rights() == {(0o660, number)}
+    with mpf.Server("closed"):
+        assert rights() == {(0o600, os.getgid())}
+
+
+def test_invalid_arguments_of_a_server_are_named() -> None:
+    with pytest.raises(ValueError, match="mode: 0o1224 .* 0o660"):
+        mpf.Server("tested", mode=660)
+    with pytest.raises(ValueError, match="mode: 0o60 "):
+        mpf.Server("tested", mode=0o060)
+    with pytest.raises(ValueError, match="group: .*'no such group'"):
+        mpf.Server("tested", group="no such group")
+    with pytest.raises(ValueError, match="max borrowed 1000: use 1 to 64"):
+        mpf.Server("tested", max_borrowed=1000)
+
+
+def test_a_loan_that_is_too_large_is_refused(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: server.loan(request, mpf.Float64Array, 10**9))
+    with server.start(), mpf.Client("tested", timeout=PATIENCE) as client:
+        with pytest.raises(mpf.StatusError, match="TooLarge: .*8000000024 bytes, the limit is"):
+            client.call(mpf.Int32(), reply=mpf.Message)
+        with pytest.raises(mpf.TooLarge, match="no loan: .* the limit is 67108864"):
+            client.loan(mpf.Float64Array, 10**9)
+        with pytest.raises(mpf.TooLarge):
+            server.loan_shared(mpf.Float64Array, 10**9)

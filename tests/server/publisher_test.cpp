@@ -241,7 +241,7 @@ TEST_F(PublisherTest, RefusesAnInvalidLimit) {
     options_.maxBorrowed = invalid;
     EXPECT_EQ(whatOf<std::invalid_argument>(
                   [&] { Publisher(name(), server_->endpoint.window(), counts_, options_); }),
-              "maxBorrowed " + std::to_string(invalid) + ": use 1 to 64");
+              "max borrowed " + std::to_string(invalid) + ": use 1 to 64");
   }
 }
 

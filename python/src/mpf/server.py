@@ -40,6 +40,7 @@ from mpf._mpf import Message
 from mpf.ending import at_sigterm, close_at_exit
 from mpf.errors import Error, QueueFull
 from mpf.replies import NoMoreReplies, of_error, with_value
+from mpf.server_arguments import checked_mode, number_of_group, own_name_explained
 from mpf.streams import Streams
 
 M = TypeVar("M", bound=Message)
@@ -61,9 +62,12 @@ class Server(_mpf.BaseServer):
     max_message_bytes: the largest request and reply [bytes].
     max_borrowed: published messages that one client may hold, 1 to 64; see publish().
     wait: "adaptive", "spin" or "block", as for a client.
+    mode, group: which users may be clients, as the options --mode and --group of the programs of
+        MPF; by default only the user of this process. `mode=0o660, group="mpf"` admits the members
+        of this group, for example the router.
 
-    Raises NameInUse if another process serves this name, OSError if there is no memory in /dev/shm,
-    ValueError if an argument is invalid.
+    Raises NameInUse if this or another process serves this name, OSError if there is no memory in
+    /dev/shm, ValueError if an argument is invalid.
     """
 
     def __init__(
@@ -76,16 +80,21 @@ class Server(_mpf.BaseServer):
         max_message_bytes: int = 64 << 20,
         max_borrowed: int = 4,
         wait: str = "adaptive",
+        mode: int = 0o600,
+        group: str | None = None,
     ) -> None:
-        super().__init__(
-            name,
-            location,
-            backplane=backplane,
-            queue_size=queue_size,
-            max_message_bytes=max_message_bytes,
-            max_borrowed=max_borrowed,
-            wait=wait,
-        )
+        with own_name_explained(name):
+            super().__init__(
+                name,
+                location,
+                backplane=backplane,
+                queue_size=queue_size,
+                max_message_bytes=max_message_bytes,
+                max_borrowed=max_borrowed,
+                wait=wait,
+                mode=checked_mode(mode),
+                group=None if group is None else number_of_group(group),
+            )
         self._handlers: dict[type[Message], Callable[[Any], object]] = {}
         self._tasks: set[asyncio.Task[Any]] = set()
         self._closing: set[asyncio.Task[Any]] = set()  # that have called close()
