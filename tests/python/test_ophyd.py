@@ -153,6 +153,28 @@ async def test_a_command_is_executed(dac: Dac) -> None:
     assert dac.values[mpf.Int32] == 42
 
 
+@pytest.mark.parametrize("access", ["get_value", "set", "trigger"])
+async def test_an_access_without_a_server_says_so(access: str) -> None:
+    with Dac().start():
+        signal = mpf_signal_rw(
+            float, "dac", mpf.Float64(cmd=READ), mpf.Float64(cmd=WRITE), timeout=PATIENCE
+        )
+        command = mpf_triggerable_command("dac", mpf.Int32(), timeout=PATIENCE)
+        await signal.connect()
+        await command.connect()
+    for one in (signal, command):
+        one._connector.backend._server._patience = 0.01  # type: ignore[attr-defined]
+    while signal._connector.backend._server.client().connected:  # type: ignore[attr-defined]
+        await asyncio.sleep(0)
+
+    with pytest.raises(NotConnectedError, match="the server dac is absent"):
+        if access == "trigger":
+            await command.trigger()
+        else:
+            await (signal.get_value() if access == "get_value" else signal.set(2.0))
+    mpf_disconnect()
+
+
 async def test_an_absent_server_is_named() -> None:
     with pytest.raises(NotConnectedError, match="dac is absent"):
         await voltage().connect(timeout=0.05)

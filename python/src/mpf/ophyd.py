@@ -82,6 +82,7 @@ class MpfSignalBackend(SignalBackend[SignalDatatypeT]):
         write: Message | None,
         *,
         location: int | None = None,
+        timeout: float = DEFAULT_TIMEOUT,
         subscribe: Message | None = None,
         poll: float = 1.0,
         units: str | None = None,
@@ -89,7 +90,7 @@ class MpfSignalBackend(SignalBackend[SignalDatatypeT]):
     ) -> None:
         super().__init__(datatype)
         self._converter = _Converter(datatype)
-        self._server = _Server(server, location)
+        self._server = _Server(server, location, timeout)
         self._read = read
         self._write = write
         self._subscribe = subscribe
@@ -116,7 +117,7 @@ class MpfSignalBackend(SignalBackend[SignalDatatypeT]):
     async def put(self, value: SignalDatatypeT | None) -> None:
         assert self._write is not None
         message = self._write if value is None else self._converter.message(self._write, value)
-        await self._server.client().call(message, math.inf, reply=Message)
+        await self._server.call(message)
         self._setpoint = value
         if self._callback is None:
             return
@@ -130,7 +131,7 @@ class MpfSignalBackend(SignalBackend[SignalDatatypeT]):
 
     async def get_reading(self) -> Reading[SignalDatatypeT]:
         assert self._read is not None
-        return self._reading(await self._server.client().call(self._read, math.inf, reply=Message))
+        return self._reading(await self._server.call(self._read))
 
     async def get_value(self) -> SignalDatatypeT:
         return (await self.get_reading())["value"]
@@ -188,9 +189,16 @@ class MpfSignalBackend(SignalBackend[SignalDatatypeT]):
 class MpfCommandBackend(CommandBackend[[], None]):
     """A request that makes a server do something."""
 
-    def __init__(self, server: str, message: Message, *, location: int | None = None) -> None:
+    def __init__(
+        self,
+        server: str,
+        message: Message,
+        *,
+        location: int | None = None,
+        timeout: float = DEFAULT_TIMEOUT,
+    ) -> None:
         super().__init__(NO_ARG_VOID_SIGNATURE)
-        self._server = _Server(server, location)
+        self._server = _Server(server, location, timeout)
         self._message = message
 
     def source(self, name: str) -> str:
@@ -200,7 +208,7 @@ class MpfCommandBackend(CommandBackend[[], None]):
         await self._server.connect(timeout)
 
     async def execute(self) -> None:
-        await self._server.client().call(self._message, math.inf, reply=Message)
+        await self._server.call(self._message)
 
 
 def mpf_signal_r(
@@ -213,7 +221,7 @@ def mpf_signal_r(
     **options: Any,
 ) -> SignalR[SignalDatatypeT]:
     """A value that can be read. The arguments are those of mpf_signal_rw()."""
-    backend = MpfSignalBackend(datatype, server, read, None, **options)
+    backend = MpfSignalBackend(datatype, server, read, None, timeout=timeout, **options)
     return SignalR(backend, name=name, timeout=timeout)
 
 
@@ -232,7 +240,8 @@ def mpf_signal_rw(
     read: the request whose reply has the value.
     write: the request that writes, with another value each time. Its reply is awaited; a status
         other than 0 raises StatusError. A write of None sends it as it is.
-    timeout: [s] of an access; then TimeoutError.
+    timeout: [s] of an access; then TimeoutError. If the server is absent for half of this time,
+        the access raises NotConnectedError.
 
     The options of all signals:
 
@@ -242,7 +251,7 @@ def mpf_signal_rw(
         reading with the alarm severity -1.
     units, precision: metadata of numbers.
     """
-    backend = MpfSignalBackend(datatype, server, read, write, **options)
+    backend = MpfSignalBackend(datatype, server, read, write, timeout=timeout, **options)
     return SignalRW(backend, name=name, timeout=timeout)
 
 
@@ -256,7 +265,7 @@ def mpf_signal_w(
     **options: Any,
 ) -> SignalW[SignalDatatypeT]:
     """A value that can be written. The arguments are those of mpf_signal_rw()."""
-    backend = MpfSignalBackend(datatype, server, None, write, **options)
+    backend = MpfSignalBackend(datatype, server, None, write, timeout=timeout, **options)
     return SignalW(backend, name=name, timeout=timeout)
 
 
@@ -269,7 +278,7 @@ def mpf_triggerable_command(
     timeout: float = DEFAULT_TIMEOUT,
 ) -> TriggerableCommand:
     """A command without arguments: `trigger()` sends the request and awaits its reply."""
-    backend = MpfCommandBackend(server, message, location=location)
+    backend = MpfCommandBackend(server, message, location=location, timeout=timeout)
     return TriggerableCommand(backend, name=name, timeout=timeout)
 
 
@@ -280,8 +289,10 @@ _clients: WeakValueDictionary[_Key, AsyncClient] = WeakValueDictionary()
 
 
 class _Server:
-    def __init__(self, name: str, location: int | None) -> None:
+    def __init__(self, name: str, location: int | None, timeout: float) -> None:
         self._key = (name, location)
+        # ophyd ends an access without a reason when its whole time has passed.
+        self._patience = timeout / 2
         self._client: AsyncClient | None = None  # it lives as long as one of its signals
 
     def client(self) -> AsyncClient:
@@ -294,6 +305,12 @@ class _Server:
     async def connect(self, timeout: float) -> None:
         if not await self.client().wait_connected(timeout):
             raise NotConnectedError(f"the server {self._key[0]} is absent: `mpf ls` lists servers")
+
+    async def call(self, message: Message) -> Message:
+        """Waits for the reply until it is cancelled, for an absent server until then."""
+        await self.connect(self._patience)
+        reply: Message = await self.client().call(message, math.inf, reply=Message)
+        return reply
 
     def source(self, message: Message | None) -> str:
         name, location = self._key
