@@ -275,9 +275,9 @@ void addClient(nb::module_& module) {
                     const std::string&>(),
            "server"_a, "location"_a = nb::none(), nb::kw_only(), "backplane"_a = "",
            "timeout"_a = 5.0, "wait"_a = "adaptive")
-      .def("_call", &PyClient::call, "message"_a, "timeout"_a = nb::none(), nb::kw_only(),
+      .def("call", &PyClient::call, "message"_a, "timeout"_a = nb::none(), nb::kw_only(),
            "reply"_a = nb::none(), "retry"_a = false, "check"_a = true,
-           nb::sig("def _call(self, message: Message, timeout: float | None = None, *, reply: "
+           nb::sig("def call(self, message: Message, timeout: float | None = None, *, reply: "
                    "type[Message] | None = None, retry: bool = False, check: bool = True) -> "
                    "Message"),
            kCallText)

@@ -27,6 +27,7 @@ NB_MODULE(_mpf, module) {
   refuseSubinterpreter();
   nanobind::set_leak_warnings(false);  // a program may end while its threads use objects
   module.doc() = "The parts of mpf that are written in C++.";
+  module.attr("version") = MPF_PYTHON_VERSION;
   mpf::python::countForks();
   mpf::python::forgetThreadsInForks();
   nanobind::module_::import_("atexit").attr("register")(

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import inspect
+import pydoc
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from conftest import PROGRAMS, needs_mpf
 
 import mpf
 import mpf.ophyd
@@ -32,6 +34,21 @@ def test_each_public_name_has_a_docstring(module: ModuleType) -> None:
     found = [one for name in module.__all__ for one in members(name, getattr(module, name))]
     assert len(found) > len(module.__all__)
     assert [name for name, thing in found if not inspect.getdoc(thing)] == []
+
+
+@pytest.mark.parametrize("client", [mpf.Client, mpf.AsyncClient])
+def test_help_shows_the_arguments_of_call(client: type) -> None:
+    text = pydoc.render_doc(client, renderer=pydoc.plaintext)
+    assert "_call" not in text
+    call = text[text.index(" call(") :].split("\n |  \n")[0]
+    assert "call(self, message: " in call
+    assert "retry: if the server ends before it has received the request" in call
+
+
+@needs_mpf
+def test_the_package_has_the_version_of_the_programs() -> None:
+    shown = subprocess.run([PROGRAMS / "mpf", "--version"], capture_output=True, text=True).stdout
+    assert shown == f"mpf {mpf.__version__}\n"
 
 
 def test_the_reference_has_each_public_name(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ try:
         Request,
         SerialConfig,
         User,
+        version,
     )
 except ImportError as error:  # its cause is the reason, for example a sub-interpreter
     raise error.__cause__ or error
@@ -54,6 +55,9 @@ from mpf.inspection import Ghost, Recording, Running, Tap, record, replay, serve
 from mpf.instruments import Gpib, Instrument, Serial
 from mpf.server import Server
 from mpf.subscription import Subscription
+
+#: The version of this package, as of the programs of MPF.
+__version__: str = version
 
 __all__ = [
     "AsyncClient",

@@ -30,7 +30,8 @@ Self = TypeVar("Self")
 
 
 class AsyncClient(_mpf.BaseClient):
-    """As Client, for asyncio: `await client.call(...)`, `async for ... in client.subscribe()`."""
+    """As Client, for asyncio: `await client.call(...)`, `async for ... in client.subscribe()`. The
+    arguments are those of Client."""
 
     def __init__(
         self,
@@ -114,7 +115,21 @@ class AsyncClient(_mpf.BaseClient):
         retry: bool = False,
         check: bool = True,
     ) -> Any:
-        """As Client.call()."""
+        """Sends a request and waits for its reply. Cancelling the task cancels the request; the
+        server may act on it all the same.
+
+        message: the request. It can be sent again; a loaned array is empty then.
+        timeout: [s] for the connection, the request and the reply together; None: that of the
+            client.
+        reply: the class of the reply, mpf.Message for any; by default that of the request, and
+            Int32 for a SerialConfig.
+        retry: if the server ends before it has received the request, send it to the next server of
+            this name. No request is executed twice by it.
+        check: raise StatusError if the status of the reply is not 0, and UnexpectedReply if it is
+            of another class. False: return any reply.
+
+        Raises the exceptions of Client.call().
+        """
         limit = self._until(timeout)
         request = await self._start(message, limit, reply=reply, retry=retry)
         try:
