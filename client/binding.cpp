@@ -5,6 +5,7 @@
 
 #include "base/step.h"
 #include "shm/histogram.h"
+#include "shm/process.h"
 #include "shm/segment_name.h"
 #include "shm/shortage.h"
 
@@ -41,6 +42,14 @@ void Binding::setValueHandler(ValueHandler handler) {
   if (values_.type != MessageType::none)
     throw std::logic_error("MessageClient::onValues(): the client has a callback for values");
   values_ = std::move(handler);
+}
+
+std::int32_t Binding::serverPid() const noexcept {
+  const auto pidNamespace = Process::self().pidNamespace;  // may read a file
+  const BiasedLock::Guard lock(*sender_.lock());
+  if (!isConnected()) return 0;
+  const auto& header = channel().link().peer()->header();
+  return header.pidNamespace == pidNamespace ? header.ownerPid : 0;
 }
 
 void Binding::tryConnect() try {

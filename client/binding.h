@@ -55,6 +55,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   BodyBytes allocate(std::size_t bytes) { return sender_.allocate(bytes); }
   [[nodiscard]] bool isConnected() const noexcept { return state() == BindingState::connected; }
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept { return sender_.maxMessageBytes(); }
+  [[nodiscard]] std::int32_t serverPid() const noexcept;
   [[nodiscard]] std::string notConnectedBecause() const {
     return isConnected() ? std::string() : connector_.notConnectedBecause();
   }

@@ -103,6 +103,9 @@ bool MessageClient::isConnected() const noexcept {
 std::uint64_t MessageClient::maxMessageBytes() const noexcept {
   return isInherited() ? 0 : binding_->maxMessageBytes();
 }
+std::int32_t MessageClient::serverPid() const noexcept {
+  return isInherited() ? 0 : binding_->serverPid();
+}
 std::string MessageClient::notConnectedBecause() const {
   return isInherited() ? ForkGuard::explain("MessageClient") : binding_->notConnectedBecause();
 }

@@ -178,6 +178,9 @@ class MessageClient {
   [[nodiscard]] bool isConnected() const noexcept;
   // [bytes] The largest body that the server accepts; 0 without a connection.
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
+  // The process of the server; at another location, that of the router to it. 0 without a
+  // connection, and if the process is in another pid namespace.
+  [[nodiscard]] std::int32_t serverPid() const noexcept;
   // The reason why the client is not connected, in words; empty when it is connected.
   [[nodiscard]] std::string notConnectedBecause() const;
 

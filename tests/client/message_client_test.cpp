@@ -79,6 +79,19 @@ TEST_F(ClientTest, AServerStampsItsRepliesIfItIsAskedTo) {
   EXPECT_EQ(next().getTimeStampNs(), 5);
 }
 
+TEST_F(ClientTest, AConnectedClientHasThePidOfItsServer) {
+  EXPECT_EQ(client_.serverPid(), 0);
+  startServer();
+  client_.bind("device[0]/a");
+  runUntil([&] { return client_.isConnected(); });
+
+  EXPECT_EQ(client_.serverPid(), ::getpid());
+
+  server_.reset();
+  runUntil([&] { return !client_.isConnected(); });
+  EXPECT_EQ(client_.serverPid(), 0);
+}
+
 // The process of the server does not exit, and the server could not close a link.
 TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   startServer();
