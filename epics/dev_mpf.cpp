@@ -13,12 +13,12 @@
 #include <epicsTime.h>
 #include <errlog.h>
 #include <fmt/format.h>
-#include <menuPini.h>
 #include <optional>
 #include <recGbl.h>
 #include <recSup.h>
 #include <utility>
 
+#include "epics/common_fields.h"
 #include "epics/fate_text.h"
 #include "epics/ioc_clients.h"
 #include "epics/link_address.h"
@@ -97,9 +97,8 @@ class DevMpf::Impl final : public SharedClient::Member,
                                                         ioInterrupt ? record->name : "");
       member_ = connection_->add(*this);
     } catch (const std::exception& error) {
-      errlogPrintf("%s: %s: %s\n", record->name, isOutput_ ? "OUT" : "INP", error.what());
+      refuseLink(record, isOutput_ ? "OUT" : "INP", error.what());
       status_ = S_db_badField;
-      record->pact = TRUE;  // the record never processes
     }
   }
 
@@ -108,9 +107,10 @@ class DevMpf::Impl final : public SharedClient::Member,
     if (queue_.push(std::move(message))) callbacks_.add(*this);
   }
   void tick(std::int64_t nowNs) override {
+    // PAIR(request-id): if it is that of a new request, the deadline of the one before is gone.
+    const auto requestId = requestId_.load(std::memory_order_acquire);
     const auto deadlineNs = deadlineNs_.load(std::memory_order_relaxed);
-    if (deadlineNs == 0 || nowNs < deadlineNs) return;
-    connection_->cancel(requestId_.load(std::memory_order_relaxed));
+    if (deadlineNs != 0 && nowNs >= deadlineNs) connection_->cancel(requestId);
   }
   void print() const override {
     if (const auto overruns = queue_.overruns(); overruns != 0)
@@ -135,8 +135,9 @@ class DevMpf::Impl final : public SharedClient::Member,
       if (const auto* fate = reply.tryAs<RequestFate>()) return failFate(fate->fate);
       return device_.completeIO(record_, std::move(reply));
     }
-    if (!connection_ || !connection_->isConnected()) return failDisconnected();
-    return device_.startIO(record_);
+    const auto status = start();
+    if (record_->nsev == INVALID_ALARM && !hasMessageTime_) stampNow();
+    return status;
   }
   long send(Message&& message, ReplyType reply) {
     const auto deadline = timeout_.count() == 0 ? Deadline::never() : Deadline::after(timeout_);
@@ -157,10 +158,11 @@ class DevMpf::Impl final : public SharedClient::Member,
   void onConnect(const Connect& connect) {
     if (record_->pact) return;  // its request ends with an alarm of its own
     if (connect.status == ConnectStatus::connectYes) {
-      if (hasProcessed_ || record_->pini == menuPiniYES) dbProcess(record_);
+      if (hasProcessed_ || processesAtStart(record_)) dbProcess(record_);
       return;
     }
     failDisconnected();
+    stampNow();
     recGblGetTimeStamp(record_);
     const auto mask = recGblResetAlarms(record_);
     if (mask != 0) db_post_events(record_, valueOf(record_), mask | DBE_VALUE | DBE_LOG);
@@ -176,10 +178,28 @@ class DevMpf::Impl final : public SharedClient::Member,
   Nanoseconds timeout_ = kDefaultTimeout;
 
  private:
+  long start() {
+    if (!connection_ || !connection_->isConnected()) return failDisconnected();
+    if (connection_->isServerStopped()) return failComm("server is stopped");
+    return device_.startIO(record_);
+  }
   void handle(Message&& message) {
     if (const auto* connect = message.tryAs<Connect>()) return device_.connectIO(record_, *connect);
-    if (record_->tse == epicsTimeEventDeviceTime)
-      record_->time = timeStampOf(message.getTimeStampNs());
+    if (!message) return onServerStopped();
+    stamp(timeStampOf(message.getTimeStampNs()));
+    hasMessageTime_ = true;
+    dispatch(std::move(message));
+    hasMessageTime_ = false;
+  }
+  // The server was stopped, or runs again: start() sets the alarm, or gets the value.
+  void onServerStopped() {
+    if (hasProcessed_ && !record_->pact) dbProcess(record_);
+  }
+  void stamp(const epicsTimeStamp& time) {
+    if (record_->tse == epicsTimeEventDeviceTime) record_->time = time;
+  }
+  void stampNow() { stamp(timeStampOf(0)); }
+  void dispatch(Message&& message) {
     if (message.getType() == MessageType::outOfBand)
       return device_.outOfBandIO(record_, std::move(message));
     switch (SharedClient::replyTypeOf(message)) {
@@ -203,8 +223,10 @@ class DevMpf::Impl final : public SharedClient::Member,
     reply_.reset();  // a disabled record does not use it
   }
   long failDisconnected() {
-    recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "%s",
-                     connection_ ? whyDisconnected(*connection_).c_str() : "invalid link");
+    return failComm(connection_ ? whyDisconnected(*connection_).c_str() : "invalid link");
+  }
+  long failComm(const char* reason) {
+    recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "%s", reason);
     return -1;
   }
   long failFate(Fate fate) {
@@ -213,21 +235,21 @@ class DevMpf::Impl final : public SharedClient::Member,
         return device_.fail(record_, textOf(fate));
       case Fate::neverTaken:
       case Fate::outcomeUnknown:
-        recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "%s", textOf(fate));
-        break;
+        return failComm(textOf(fate));
       case Fate::expired:
       case Fate::cancelled:
-        recGblSetSevrMsg(record_, TIMEOUT_ALARM, INVALID_ALARM, "no reply in %g s",
-                         std::chrono::duration<double>(timeout_).count());
         break;
     }
+    recGblSetSevrMsg(record_, TIMEOUT_ALARM, INVALID_ALARM, "no reply in %g s",
+                     std::chrono::duration<double>(timeout_).count());
     return -1;
   }
 
   friend class DevMpf;
   std::uint32_t member_ = 0;
-  bool isRequestOutstanding_ = false;  // these three with the record locked
+  bool isRequestOutstanding_ = false;  // these four with the record locked
   bool hasProcessed_ = false;
+  bool hasMessageTime_ = false;  // TSE -2: the record processes with the time of a message
   std::optional<Message> reply_;  // the message that the record processes now
   RecordQueue queue_;
   CallbackQueue& callbacks_ = IocClients::instance().callbacks(record_->prio);
@@ -296,6 +318,7 @@ long DevMpf::readWrite(dbCommon* record) {
     recGblSetSevrMsg(record, SOFT_ALARM, INVALID_ALARM, "no device support");
     return S_dev_noDevSup;
   }
+  forgetReason(record);
   return device->impl_->process();
 }
 

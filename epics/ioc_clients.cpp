@@ -100,6 +100,20 @@ void IocClients::tick() {
   const auto nowNs = Clock::nowNs();
   for (const auto& [key, connection] : connections_) connection->serveBacklog();
   for (const auto& [owner, device] : devices_) device->tick(nowNs);
+  if (nextLook_.hasPassed()) lookForStoppedServers();
+}
+
+void IocClients::lookForStoppedServers() {
+  nextLook_ = Deadline::after(kLook);
+  std::map<SharedClient*, std::int32_t> pids;
+  std::set<std::int32_t> all;
+  for (const auto& [key, connection] : connections_) {
+    if (std::get<2>(key).empty()) continue;  // its records have timeouts
+    pids[connection.get()] = connection->serverPid();
+    all.insert(pids[connection.get()]);
+  }
+  stopped_.look(all);
+  for (const auto& [connection, pid] : pids) connection->setServerStopped(stopped_.contains(pid));
 }
 
 void IocClients::flush() {

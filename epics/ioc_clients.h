@@ -5,7 +5,9 @@
 //   messages wait          callbacks are requested     no message is received
 //
 // Its thread runs the dispatcher of all connections. After each few messages it requests the
-// callbacks of their records, and every kTick it looks for requests without a reply in time.
+// callbacks of their records, and every kTick it looks for requests without a reply in time. Every
+// kLook it looks for servers of subscriptions that are stopped: a server that is idle sends nothing
+// either.
 //
 // Threads  any.
 #pragma once
@@ -27,12 +29,14 @@
 
 #include "epics/callback_queue.h"
 #include "epics/shared_client.h"
+#include "epics/stopped_processes.h"
 
 namespace mpf {
 
 class IocClients {
  public:
   static constexpr auto kTick = std::chrono::milliseconds(20);
+  static constexpr auto kLook = std::chrono::seconds(1);
 
   class Device {
    public:
@@ -67,6 +71,7 @@ class IocClients {
   void startDispatcher();
   void run(const std::stop_token& stop);
   void tick();
+  void lookForStoppedServers();
   void flush();
 
   mutable std::mutex mutex_;
@@ -78,6 +83,8 @@ class IocClients {
   std::atomic<bool> isRunning_{false};
   std::optional<Dispatcher> dispatcher_;  // from the first connection until the IOC shuts down
   std::jthread thread_;
+  StoppedProcesses stopped_;  // of the thread, as the next
+  Deadline nextLook_ = Deadline::after(kLook);
 };
 
 }  // namespace mpf

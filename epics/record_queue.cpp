@@ -7,6 +7,7 @@
 namespace mpf {
 namespace {
 
+// Also the empty message, which is about the server: the record must not process for it now.
 bool isFurtherReply(const Message& message) noexcept {
   return !endsRequest(message) && message.getType() != MessageType::connect;
 }

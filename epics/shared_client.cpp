@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "epics/shared_client.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace mpf {
@@ -16,6 +17,11 @@ Message fateOf(const Message& request, Fate fate) {
   message.setClientExtra(request.getClientExtra());
   message.setRoute({0, 0, kEndsRequest, nullptr});
   return message;
+}
+
+void storeId(std::atomic<std::uint32_t>& requestId, std::uint32_t id) noexcept {
+  // PAIR(request-id): after the deadline of the request before was cleared.
+  requestId.store(id, std::memory_order_release);
 }
 
 }  // namespace
@@ -46,12 +52,13 @@ SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& m
   if (backlog_.empty()) {
     std::uint32_t id = 0;
     const auto result = client_->send(std::move(message), deadline, &id);
-    if (result == SendResult::sent) requestId.store(id, std::memory_order_relaxed);
+    if (result == SendResult::sent) storeId(requestId, id);
     if (!isFull(result)) return result;
   }
   if (backlog_.size() >= kMaxBacklog) return SendResult::queueFull;
   // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
   backlog_.push_back({std::move(message), deadline, &requestId});
+  nextDeadline_ = std::min(nextDeadline_, deadline);
   hasBacklog_.store(true, std::memory_order_relaxed);
   return SendResult::sent;
 }
@@ -66,32 +73,43 @@ void SharedClient::serveBacklog() {
   std::vector<Message> fates;
   {
     const std::lock_guard lock(mutex_);
-    while (!backlog_.empty()) {
-      auto& waiting = backlog_.front();
-      std::uint32_t id = 0;
-      auto result = SendResult::sent;
-      if (waiting.deadline.hasPassed()) {
-        fates.push_back(fateOf(waiting.message, Fate::expired));
-      } else {
-        const auto clientType = waiting.message.getClientType();
-        result = client_ ? client_->send(std::move(waiting.message), waiting.deadline, &id)
-                         : SendResult::notConnected;
-        if (isFull(result)) break;
-        if (result == SendResult::sent) {
-          waiting.requestId->store(id, std::memory_order_relaxed);
-        } else {
-          waiting.message.setClientType(clientType);
-          fates.push_back(fateOf(waiting.message, Fate::neverTaken));
-        }
-      }
-      backlog_.pop_front();
-    }
+    if (nextDeadline_.hasPassed()) endExpired(fates);
+    while (!backlog_.empty() && trySendFirst(fates)) backlog_.pop_front();
     hasBacklog_.store(!backlog_.empty(), std::memory_order_relaxed);
   }
   for (auto& fate : fates) {
     const auto clientType = fate.getClientType();
     deliver(clientType, std::move(fate));
   }
+}
+
+void SharedClient::endExpired(std::vector<Message>& fates) {
+  nextDeadline_ = Deadline::never();
+  std::erase_if(backlog_, [&](const Waiting& waiting) {
+    if (waiting.deadline.hasPassed()) {
+      fates.push_back(fateOf(waiting.message, Fate::expired));
+      return true;
+    }
+    nextDeadline_ = std::min(nextDeadline_, waiting.deadline);
+    return false;
+  });
+}
+
+// Returns false when the queue of the server is full.
+bool SharedClient::trySendFirst(std::vector<Message>& fates) {
+  auto& waiting = backlog_.front();
+  const auto clientType = waiting.message.getClientType();
+  std::uint32_t id = 0;
+  const auto result = client_ ? client_->send(std::move(waiting.message), waiting.deadline, &id)
+                              : SendResult::notConnected;
+  if (isFull(result)) return false;
+  if (result == SendResult::sent) {
+    storeId(*waiting.requestId, id);
+  } else {
+    waiting.message.setClientType(clientType);
+    fates.push_back(fateOf(waiting.message, Fate::neverTaken));
+  }
+  return true;
 }
 
 void SharedClient::endBacklog(Fate fate) {
@@ -117,6 +135,7 @@ void SharedClient::close() {
 
 void SharedClient::onMessage(Message&& message) {
   if (const auto* connect = message.tryAs<Connect>()) return onConnect(*connect);
+  if (message.getType() != MessageType::requestFate) setServerStopped(false);  // it has sent this
   const auto clientType = message.getClientType();
   deliver(clientType, std::move(message));
   serveBacklog();
@@ -127,7 +146,16 @@ void SharedClient::onConnect(const Connect& connect) {
   if (connect.status == ConnectStatus::connectNo) endBacklog(Fate::neverTaken);
   const std::lock_guard lock(mutex_);
   isConnected_ = connect.status == ConnectStatus::connectYes;
+  isServerStopped_.store(false, std::memory_order_relaxed);
   for (auto* member : members_) member->deliver(ConnectMessage(connect));
+}
+
+void SharedClient::setServerStopped(bool isStopped) {
+  if (isServerStopped() == isStopped) return;
+  const std::lock_guard lock(mutex_);
+  if (!isConnected_) return;
+  isServerStopped_.store(isStopped, std::memory_order_relaxed);
+  for (auto* member : members_) member->deliver(Message());
 }
 
 void SharedClient::deliver(std::int32_t clientType, Message&& message) {
@@ -143,6 +171,11 @@ void SharedClient::deliver(std::int32_t clientType, Message&& message) {
 bool SharedClient::isConnected() const {
   const std::lock_guard lock(mutex_);
   return client_ && client_->isConnected();
+}
+
+std::int32_t SharedClient::serverPid() const {
+  const std::lock_guard lock(mutex_);
+  return client_ ? client_->serverPid() : 0;
 }
 
 std::string SharedClient::notConnectedBecause() const {

@@ -6,6 +6,7 @@
 //   record ◄── Member::deliver() ◄────── MessageClient ◄── replies, fates, connections
 //
 // When the queue of the server is full, messages wait in the backlog until earlier requests end.
+// A message whose deadline passes there expires, also behind messages that may wait longer.
 //
 // Threads  any. deliver() runs on the dispatcher's thread, or in add(); it must not call this
 //          object.
@@ -30,6 +31,7 @@ class SharedClient {
   // A record of the connection. It outlives the connection.
   class Member {
    public:
+    // An empty message: isServerStopped() has changed.
     virtual void deliver(Message&& message) = 0;
 
    protected:
@@ -60,6 +62,14 @@ class SharedClient {
   // Ends the client: nothing is delivered after it.
   void close();
 
+  // Whether the process of the server is stopped, so that it sends nothing. The answer of
+  // isServerStopped() is false again after each connection and disconnection.
+  void setServerStopped(bool isStopped);
+  [[nodiscard]] bool isServerStopped() const noexcept {
+    return isServerStopped_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] std::int32_t serverPid() const;
+
   [[nodiscard]] bool isConnected() const;
   [[nodiscard]] std::string notConnectedBecause() const;
   [[nodiscard]] const std::string& server() const noexcept { return server_; }
@@ -78,6 +88,8 @@ class SharedClient {
   };
   void onMessage(Message&& message);
   void onConnect(const Connect& connect);
+  void endExpired(std::vector<Message>& fates);
+  bool trySendFirst(std::vector<Message>& fates);
   void endBacklog(Fate fate);
   void deliver(std::int32_t clientType, Message&& message);
 
@@ -87,9 +99,11 @@ class SharedClient {
   std::unique_ptr<MessageClient> client_;  // all below under mutex_
   std::vector<Member*> members_;
   std::deque<Waiting> backlog_;
+  Deadline nextDeadline_ = Deadline::never();  // none in the backlog is earlier
   bool isBound_ = false;
   bool isConnected_ = false;  // as the members were last told
   std::atomic<bool> hasBacklog_{false};
+  std::atomic<bool> isServerStopped_{false};  // written under mutex_
 };
 
 }  // namespace mpf

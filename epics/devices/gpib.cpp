@@ -30,6 +30,7 @@
 
 #include <mpf/gpib_commands.h>
 
+#include "epics/common_fields.h"
 #include "epics/devices/string_parm/text_device.h"
 #include "epics/devices/string_parm/value_format.h"
 

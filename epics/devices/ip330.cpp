@@ -8,8 +8,7 @@
 #include <aiRecord.h>
 #include <algorithm>
 #include <cstring>
-#include <dbAccess.h>
-#include <errlog.h>
+#include <fmt/format.h>
 #include <longoutRecord.h>
 #include <string_view>
 
@@ -17,6 +16,7 @@
 #include <mpf/ip330_commands.h>
 
 #include "base/number.h"
+#include "epics/common_fields.h"
 
 namespace mpf {
 namespace {
@@ -35,9 +35,8 @@ class DevAiIp330Scan final : public DevMpf {
     const auto text = withoutBlanks(getUserParm());
     gain_ = text.empty() ? 0 : tryNumber<int>(text).value_or(-1);
     if (gain_ < 0 || gain_ > 3) {
-      errlogPrintf("%s: INP: gain \"%s\": use 0, 1, 2 or 3\n", record->name, getUserParm());
-      setStatus(S_db_badField);
-      record->pact = TRUE;  // the record never processes
+      refuseLink(*this, reinterpret_cast<dbCommon*>(record), "INP",
+                 fmt::format("gain \"{}\": use 0, 1, 2 or 3", text).c_str());
     }
     convert(reinterpret_cast<dbCommon*>(record), 1);
   }

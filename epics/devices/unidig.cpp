@@ -11,58 +11,100 @@
 #include <boRecord.h>
 #include <dbAccess.h>
 #include <dbStaticLib.h>
-#include <errlog.h>
+#include <fmt/format.h>
 #include <longinRecord.h>
+#include <mutex>
 #include <recGbl.h>
+#include <string>
+#include <utility>
 
 #include <mpf/digital_io_commands.h>
 #include <mpf/epics/dev_mpf.h>
+
+#include "epics/common_fields.h"
 
 namespace mpf {
 namespace {
 
 constexpr int kBits = 24;
 
+std::string whyNoBit(int bit) { return fmt::format("bit {}: use 0 to {}", bit, kBits - 1); }
+
+// What the bi records need of their longin record, which has another lock.
+struct InputState {
+  epicsInt32 value = 0;
+  epicsEnum16 severity = INVALID_ALARM;
+  epicsEnum16 status = UDF_ALARM;
+  std::string reason;
+};
+
 // The server sends the inputs when the monitor starts, and at each change.
 class DevLiUnidig final : public DevMpf {
  public:
   explicit DevLiUnidig(longinRecord* record)
       : DevMpf(reinterpret_cast<dbCommon*>(record), &record->inp, true) {}
+  static DevLiUnidig* of(const dbCommon* record) {
+    return static_cast<DevLiUnidig*>(static_cast<DevMpf*>(record->dpvt));
+  }
+  InputState state() const {
+    const std::lock_guard lock(mutex_);
+    return state_;
+  }
   long startIO(dbCommon*) override {
     return sendReply(Int32Message({.cmd = digital::cmdStartMonitor}));
   }
   long completeIO(dbCommon* common, Message&& message) override {
     auto* record = reinterpret_cast<longinRecord*>(common);
     const auto* reply = message.tryAs<Int32>();
-    long status = MPF_OK;
-    if (reply == nullptr) {
-      status = fail(common, "the reply is not an Int32 message");
-    } else if (reply->status != 0) {
-      status = fail(common, "the server cannot read the inputs");
-    } else {
-      record->val = reply->value;
-      record->udf = FALSE;
-    }
-    scanIoRequest(ioScan());
-    return status;
+    if (reply == nullptr) return fail(common, "the reply is not an Int32 message");
+    if (reply->status != 0) return fail(common, "the server cannot read the inputs");
+    record->val = reply->value;
+    record->udf = FALSE;
+    return MPF_OK;
   }
   void connectIO(dbCommon* record, const Connect& connect) override {
     DevMpf::connectIO(record, connect);
-    if (connect.status != ConnectStatus::connectYes) scanIoRequest(ioScan());
+    if (connect.status != ConnectStatus::connectYes && record->pact == FALSE)
+      publish(*record, {.severity = record->sevr, .status = record->stat, .reason = record->amsg});
   }
   static long init(dbCommon* record) {
     return bindDevice<DevLiUnidig>(reinterpret_cast<longinRecord*>(record));
   }
+  // The entry of the device support table: its result, unless it waits for a reply, is that of the
+  // bi records as well.
+  static long read(dbCommon* record) {
+    const bool wasActive = record->pact != FALSE;
+    const auto status = readWrite(record);
+    if (wasActive || record->pact == FALSE)
+      of(record)->publish(
+          *record, {.severity = record->nsev, .status = record->nsta, .reason = record->namsg});
+    return status;
+  }
+
+ private:
+  // Processes the bi records with this state.
+  void publish(const dbCommon& record, InputState state) {
+    state.value = reinterpret_cast<const longinRecord&>(record).val;
+    {
+      const std::lock_guard lock(mutex_);
+      state_ = std::move(state);
+    }
+    scanIoRequest(ioScan());
+  }
+
+  mutable std::mutex mutex_;
+  InputState state_;  // under mutex_
 };
+
+MpfDset devLiUnidig{
+    {5, nullptr, nullptr, DevLiUnidig::init, DevMpf::getIoIntInfo}, DevLiUnidig::read, nullptr};
 
 class DevBoUnidig final : public DevMpf {
  public:
   explicit DevBoUnidig(boRecord* record)
       : DevMpf(reinterpret_cast<dbCommon*>(record), &record->out) {
     if (getSignal() >= 0 && getSignal() < kBits) return;
-    errlogPrintf("%s: OUT: bit %d: use 0 to %d\n", record->name, getSignal(), kBits - 1);
-    setStatus(S_db_badField);
-    record->pact = TRUE;  // the record never processes
+    refuseLink(*this, reinterpret_cast<dbCommon*>(record), "OUT", whyNoBit(getSignal()).c_str());
   }
   long startIO(dbCommon* common) override {
     const auto* record = reinterpret_cast<boRecord*>(common);
@@ -83,28 +125,36 @@ class DevBoUnidig final : public DevMpf {
   }
 };
 
-// ---- bi: reads the longin record in the IOC; it sends no message
+// ---- bi: a bit of the longin record in the IOC; it sends no message
 
 struct InputBit {
-  longinRecord* inputs = nullptr;
+  dbCommon* inputs = nullptr;
   epicsUInt32 mask = 0;
 };
 
-longinRecord* findLongin(const std::string& name) {
+// A longin record with the device support of this file; nullptr if the name is of another record.
+dbCommon* findInputs(const std::string& name) {
   DBADDR address;
   if (dbNameToAddr(name.c_str(), &address) != 0) return nullptr;
-  const bool isLongin = std::string(address.precord->rdes->name) == "longin";
-  return isLongin ? reinterpret_cast<longinRecord*>(address.precord) : nullptr;
+  const bool isOurs = static_cast<const void*>(address.precord->dset) == &devLiUnidig;
+  return isOurs ? address.precord : nullptr;
 }
 
 long initBit(dbCommon* common) {
   auto* record = reinterpret_cast<biRecord*>(common);
   const int bit = record->inp.type == VME_IO ? record->inp.value.vmeio.signal : -1;
-  auto* inputs = bit >= 0 ? findLongin(record->inp.value.vmeio.parm) : nullptr;
-  if (inputs == nullptr || bit >= kBits) {
-    errlogPrintf("%s: INP: use #C0 S<bit 0 to %d> @<name of a longin record>\n", record->name,
-                 kBits - 1);
-    record->pact = TRUE;
+  if (bit < 0 || bit >= kBits) {
+    refuseLink(common, "INP", whyNoBit(bit).c_str());
+    return S_db_badField;
+  }
+  const std::string name = record->inp.value.vmeio.parm;
+  auto* inputs = findInputs(name);
+  if (inputs == nullptr) {
+    refuseLink(common, "INP",
+               fmt::format("\"{}\" is not a longin record with DTYP \"Greenspring IP-Unidig\"; use "
+                           "#C0 S<bit> @<name of the longin record>",
+                           name)
+                   .c_str());
     return S_db_badField;
   }
   record->mask = epicsUInt32{1} << bit;
@@ -116,11 +166,13 @@ long readBit(dbCommon* common) {
   auto* record = reinterpret_cast<biRecord*>(common);
   const auto* bit = static_cast<const InputBit*>(record->dpvt);
   if (bit == nullptr) return S_dev_noDevSup;
-  if (bit->inputs->sevr == INVALID_ALARM) {
-    recGblSetSevrMsg(record, bit->inputs->stat, INVALID_ALARM, "%s", bit->inputs->amsg);
+  const auto inputs = DevLiUnidig::of(bit->inputs)->state();
+  forgetReason(common);
+  if (inputs.severity == INVALID_ALARM) {
+    recGblSetSevrMsg(record, inputs.status, INVALID_ALARM, "%s", inputs.reason.c_str());
     return -1;
   }
-  record->rval = static_cast<epicsUInt32>(bit->inputs->val) & bit->mask;
+  record->rval = static_cast<epicsUInt32>(inputs.value) & bit->mask;
   record->udf = FALSE;
   return 0;
 }
@@ -128,7 +180,7 @@ long readBit(dbCommon* common) {
 long scanOfBit(int detach, dbCommon* common, IOSCANPVT* scan) {
   const auto* bit = static_cast<const InputBit*>(common->dpvt);
   if (bit == nullptr) return S_dev_noDevSup;
-  return DevMpf::getIoIntInfo(detach, reinterpret_cast<dbCommon*>(bit->inputs), scan);
+  return DevMpf::getIoIntInfo(detach, bit->inputs, scan);
 }
 
 MpfDset devBiUnidig{{5, nullptr, nullptr, initBit, scanOfBit}, readBit, nullptr};
@@ -136,9 +188,9 @@ MpfDset devBiUnidig{{5, nullptr, nullptr, initBit, scanOfBit}, readBit, nullptr}
 }  // namespace
 
 extern "C" {
+epicsExportAddress(dset, devLiUnidig);
 epicsExportAddress(dset, devBiUnidig);
 }
-MAKE_DSET(devLiUnidig, DevLiUnidig::init)
 MAKE_DSET(devBoUnidig, DevBoUnidig::init)
 
 }  // namespace mpf

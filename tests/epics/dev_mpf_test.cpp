@@ -36,6 +36,8 @@ TEST_F(DevMpfTest, ARecordRecoversWhenItsServerStarts) {
   const ThreadServer server(backplane_, "adc", echo);
 
   Ioc::waitFor("v.SEVR", "NO_ALARM");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "");
+  EXPECT_EQ(Ioc::get("v.NAMSG"), "");
 }
 
 TEST_F(DevMpfTest, ARecordIsInvalidWhenItsServerExitsAndRecoversWithTheNext) {
@@ -168,6 +170,28 @@ TEST_F(DevMpfTest, ADeviceTimeStampIsTheTimeOfAMessageWithoutOne) {
   epicsTimeGetCurrent(&after);
   EXPECT_GE(epicsTimeDiffInSeconds(&stamp, &before), 0);
   EXPECT_LE(epicsTimeDiffInSeconds(&stamp, &after), 0);
+}
+
+TEST_F(DevMpfTest, ADeviceTimeStampOfAFailureIsTheCurrentTime) {
+  constexpr std::int64_t kStampNs = 946'684'800'000'000'000;
+  std::optional<ThreadServer> server(std::in_place, backplane_, "adc",
+                                     [&](MessageServer& self, Message&& request) {
+                                       request.setTimeStampNs(kStampNs);
+                                       static_cast<void>(self.reply(std::move(request)));
+                                     });
+  const Ioc ioc(kStampedRecord);
+  Ioc::waitFor("v", "7");
+  epicsTimeStamp before;
+  epicsTimeGetCurrent(&before);
+
+  server.reset();
+  Ioc::waitFor("v.STAT", "COMM");
+
+  const auto atEnd = stampOf("v");
+  EXPECT_GE(epicsTimeDiffInSeconds(&atEnd, &before), 0);
+  static_cast<void>(Ioc::put("v.PROC", "1"));
+  const auto atProcessing = stampOf("v");
+  EXPECT_GT(epicsTimeDiffInSeconds(&atProcessing, &atEnd), 0);
 }
 
 TEST_F(DevMpfTest, AnIocShutsDownWithRequestsOutstanding) {

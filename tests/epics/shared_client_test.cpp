@@ -142,5 +142,34 @@ TEST_F(SharedClientTest, RequestsThatWaitTooLongExpire) {
   }
 }
 
+TEST_F(SharedClientTest, ARequestExpiresBehindOneWithoutATimeLimit) {
+  MessageServer server(backplane_, "s", {.queueSize = 1});
+  const auto one = client_.add(one_);
+  const auto two = client_.add(two_);
+  client_.bind();
+  while (!client_.isConnected()) {
+    server.waitForMessage(Deadline::after(std::chrono::milliseconds(1)));
+    ASSERT_FALSE(server.receive());
+  }
+  one_.expectConnect(ConnectStatus::connectYes);
+  two_.expectConnect(ConnectStatus::connectYes);
+  constexpr int kRequests = 5;
+  for (int value = 0; value < kRequests; ++value) EXPECT_EQ(send(one, value), SendResult::sent);
+  const auto deadline = Deadline::after(std::chrono::milliseconds(10));
+  EXPECT_EQ(send(two, kRequests, deadline), SendResult::sent);
+
+  while (!deadline.hasPassed()) std::this_thread::yield();
+  client_.serveBacklog();
+
+  const auto message = two_.next();
+  ASSERT_NE(message.tryAs<RequestFate>(), nullptr);
+  EXPECT_EQ(message.tryAs<RequestFate>()->fate, Fate::expired);
+  for (int value = 0; value < kRequests; ++value) {
+    EXPECT_EQ(server.reply(receive(server)), ReplyResult::sent);
+    EXPECT_EQ(valueOf(one_.next()), value);
+    client_.serveBacklog();
+  }
+}
+
 }  // namespace
 }  // namespace mpf::test

@@ -22,6 +22,7 @@
 #include <stringoutRecord.h>
 #include <vector>
 
+#include "epics/common_fields.h"
 #include "epics/devices/string_parm/text_device.h"
 
 namespace mpf {

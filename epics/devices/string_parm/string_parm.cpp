@@ -20,6 +20,7 @@
 #include <stringinRecord.h>
 #include <stringoutRecord.h>
 
+#include "epics/common_fields.h"
 #include "epics/devices/string_parm/string_parameters.h"
 #include "epics/devices/string_parm/text_device.h"
 #include "epics/devices/string_parm/value_format.h"

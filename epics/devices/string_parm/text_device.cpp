@@ -2,8 +2,6 @@
 #include "epics/devices/string_parm/text_device.h"
 
 #include <alarm.h>
-#include <dbAccess.h>
-#include <errlog.h>
 #include <recGbl.h>
 
 namespace mpf {
@@ -63,12 +61,6 @@ long takeWriteStatus(DevMpf& device, dbCommon* record, std::int32_t status) {
 void setUndefined(dbCommon* record, const char* reason) {
   record->udf = TRUE;
   recGblSetSevrMsg(record, UDF_ALARM, INVALID_ALARM, "%s", reason);
-}
-
-void refuseLink(DevMpf& device, dbCommon* record, const char* field, const char* error) {
-  errlogPrintf("%s: %s: %s\n", record->name, field, error);
-  device.setStatus(S_db_badField);
-  record->pact = TRUE;  // the record never processes
 }
 
 }  // namespace mpf

@@ -51,7 +51,4 @@ long takeWriteStatus(DevMpf& device, dbCommon* record, std::int32_t status);
 // Makes a record undefined, with a UDF alarm, severity INVALID, and AMSG `reason`.
 void setUndefined(dbCommon* record, const char* reason);
 
-// Prints "<record>: <field>: <error>" and disables the record.
-void refuseLink(DevMpf& device, dbCommon* record, const char* field, const char* error);
-
 }  // namespace mpf

@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Inputs and outputs of an IP-Unidig, with the messages of their servers.
+#include <registryFunction.h>
+#include <string>
+#include <subRecord.h>
+#include <thread>
+#include <vector>
+
 #include <mpf/digital_io_commands.h>
 
 #include "tests/epics/epics_fixture.h"
@@ -67,9 +73,76 @@ TEST_F(UnidigRecordTest, AnInputBitHasTheAlarmOfItsInputs) {
   EXPECT_EQ(Ioc::get("bit.SEVR"), "INVALID");
 }
 
+TEST_F(UnidigRecordTest, AnInputBitHasTheAlarmOfInputsWithoutAReply) {
+  std::vector<Message> kept;
+  const ThreadServer server(backplane_, "c-UnidigIn", [&](MessageServer&, Message&& request) {
+    kept.push_back(std::move(request));
+  });
+  const Ioc ioc(R"(
+    record(longin, "in") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @c-UnidigIn")
+      field(PINI, "YES") }
+    record(bi, "bit") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @in")
+      field(SCAN, "I/O Intr") }
+  )");
+
+  Ioc::waitFor("bit.STAT", "TIMEOUT");
+
+  EXPECT_EQ(Ioc::get("bit.SEVR"), "INVALID");
+  EXPECT_EQ(Ioc::get("bit.AMSG"), "no reply in 5 s");
+  kept.clear();
+}
+
+// A function of the record "gate", which the longin processes between its reply and its new alarms.
+std::string bitsAreProcessedBefore;  // value of "count"; empty: does not wait
+long waitForBit(subRecord* /*gate*/) {
+  while (!bitsAreProcessedBefore.empty() && Ioc::get("count") == bitsAreProcessedBefore)
+    std::this_thread::yield();
+  return 0;
+}
+
+TEST_F(UnidigRecordTest, AnInputBitThatProcessesBeforeItsInputsHasTheirNewState) {
+  std::atomic<std::int32_t> status = -1;
+  const ThreadServer server(backplane_, "c-UnidigIn", [&](MessageServer& self, Message&& request) {
+    request.tryAs<Int32>()->status = status;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  registryFunctionAdd("waitForBit", reinterpret_cast<REGISTRYFUNCTION>(waitForBit));
+  bitsAreProcessedBefore.clear();
+  const Ioc ioc(R"(
+    record(sub, "gate") { field(SNAM, "waitForBit") }
+    record(longin, "in") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @c-UnidigIn")
+      field(PINI, "YES") field(TSEL, "gate.VAL PP") }
+    record(bi, "bit") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @in")
+      field(SCAN, "I/O Intr") field(PRIO, "HIGH") field(FLNK, "count") }
+    record(calc, "count") { field(CALC, "VAL+1") }
+  )");
+  Ioc::waitFor("bit.AMSG", "the server cannot read the inputs");
+  Ioc::waitFor("in.PACT", "0");
+
+  status = 0;
+  bitsAreProcessedBefore = Ioc::get("count");
+  static_cast<void>(Ioc::put("in.PROC", "1"));
+  Ioc::waitFor("in.SEVR", "NO_ALARM");
+
+  EXPECT_EQ(Ioc::get("bit.SEVR"), "NO_ALARM");
+  EXPECT_EQ(Ioc::get("bit.AMSG"), "");
+}
+
+// Such a record has device support data of another type.
+TEST_F(UnidigRecordTest, AnInputBitOfALonginOfOtherDeviceSupportNeverProcesses) {
+  const Ioc ioc(R"(
+    record(longin, "gt") { field(DTYP, "General Time") field(INP, "@GETERRCNT") }
+    record(bi, "bit") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @gt")
+      field(SCAN, "I/O Intr") }
+  )");
+
+  EXPECT_EQ(Ioc::get("bit.PACT"), "1");
+  EXPECT_EQ(Ioc::get("bit.AMSG"), "\"gt\" is not a longin record with DTYP ");
+}
+
 TEST_F(UnidigRecordTest, BitsThatDoNotExistAndInputsThatAreNoLonginNeverProcess) {
   const Ioc ioc(R"(
-    record(longin, "in") {}
+    record(longin, "in") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @c-In") }
     record(ai, "other") {}
     record(bi, "bit23") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S23 @in") }
     record(bi, "bit24") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S24 @in") }
@@ -85,6 +158,9 @@ TEST_F(UnidigRecordTest, BitsThatDoNotExistAndInputsThatAreNoLonginNeverProcess)
   EXPECT_EQ(Ioc::get("ofNone.PACT"), "1");
   EXPECT_EQ(Ioc::get("out23.PACT"), "0");
   EXPECT_EQ(Ioc::get("out24.PACT"), "1");
+  EXPECT_EQ(Ioc::get("out24.SEVR"), "INVALID");
+  EXPECT_EQ(Ioc::get("out24.STAT"), "LINK");
+  EXPECT_EQ(Ioc::get("out24.AMSG"), "bit 24: use 0 to 23");
 }
 
 }  // namespace
