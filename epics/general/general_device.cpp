@@ -6,14 +6,14 @@
 #include <dbEvent.h>
 #include <dbScan.h>
 #include <dbStaticLib.h>
-#include <errlog.h>
 #include <fmt/format.h>
-#include <menuPini.h>
+#include <menuOmsl.h>
 #include <recGbl.h>
 #include <recSup.h>
 #include <stdexcept>
 #include <utility>
 
+#include "epics/common_fields.h"
 #include "epics/fate_text.h"
 #include "epics/link_address.h"
 
@@ -28,6 +28,12 @@ LinkOptions optionsOf(const dbCommon* record, const DBLINK& link, const RecordAc
   const auto inputMode = record->scan == SCAN_IO_EVENT ? Mode::subscribe : Mode::read;
   return LinkOptions::parse(LinkAddress::of(link).parameters,
                             {.type = type, .mode = access.isOutput() ? Mode::write : inputMode});
+}
+
+// Whether the server has not received the request in time; it may be busy or stopped.
+bool isExpired(const Message& message) {
+  const auto* fate = message.tryAs<RequestFate>();
+  return fate != nullptr && fate->fate == Fate::expired;
 }
 
 // Makes an alarm visible that was set while the record did not process.
@@ -54,8 +60,7 @@ long GeneralDevice::init(dbCommon* record, DBLINK* link, const RecordAccess& acc
     device->bind();
     return device->getStatus();
   } catch (const std::exception& error) {
-    errlogPrintf("%s: %s: %s\n", record->name, access.isOutput() ? "OUT" : "INP", error.what());
-    record->pact = TRUE;  // the record never processes
+    refuseLink(record, access.isOutput() ? "OUT" : "INP", error.what());
     return S_db_badField;
   }
 }
@@ -68,7 +73,7 @@ long GeneralDevice::convert(dbCommon* record, int /*pass*/) {
 long GeneralDevice::startIO(dbCommon* record) {
   switch (options_.mode) {
     case Mode::write:
-      return stored_ ? repeatResult(record) : write(record);
+      return stored_ ? endReadback(record) : write(record);
     case Mode::read: {
       auto request = makeQuery(options_, options_.cmd);
       return request ? sendReply(std::move(*request))
@@ -83,7 +88,8 @@ long GeneralDevice::startIO(dbCommon* record) {
 }
 
 long GeneralDevice::write(dbCommon* record) {
-  auto request = makeMessage(options_, options_.cmd, access_.load(record, options_, scratch_));
+  const auto value = access_.load(record, options_, scratch_);
+  auto request = value ? makeMessage(options_, options_.cmd, *value) : std::nullopt;
   if (!request) return fail(record, "the value does not fit the message");
   hasWritten_ = true;
   return sendReply(std::move(*request));
@@ -108,22 +114,35 @@ long GeneralDevice::completeIO(dbCommon* record, Message&& message) {
 }
 
 void GeneralDevice::receiveReply(dbCommon* record, Message&& message) {
-  const auto* fate = message.tryAs<RequestFate>();
-  const bool isExpired = fate != nullptr && fate->fate == Fate::expired;
-  if (options_.mode == Mode::write) {
-    if (hasWritten_ || record->pact) return;  // the record has a newer value
-    hasReadBack_ = fate == nullptr;
-    static_cast<void>(take(record, message));
-    if (!stored_) postAlarm(record);
-    else dbProcess(record);  // posts the value; write() does not run
-    stored_.reset();
-    // The server has not received the request in time; it may be busy or stopped.
-    if (isExpired) static_cast<void>(query(record, *options_.readback));
-    return;
-  }
-  if (isExpired) return subscribe(record);
+  if (options_.mode == Mode::write) return takeReadback(record, message);
+  if (isExpired(message)) return subscribe(record);
   pending_ = std::move(message);
   if (!record->pact) dbProcess(record);  // a disabled or simulated record uses it later
+}
+
+void GeneralDevice::takeReadback(dbCommon* record, const Message& message) {
+  if (hasWritten_ || record->pact) return;  // the record has a newer value
+  hasReadBack_ = message.getType() != MessageType::requestFate;
+  static_cast<void>(take(record, message));
+  if (stored_) showReadback(record);
+  else postAlarm(record);
+  if (isExpired(message)) static_cast<void>(query(record, *options_.readback));
+}
+
+long GeneralDevice::endReadback(dbCommon* record) {
+  const auto status = repeatResult(record);
+  stored_.reset();
+  return status;
+}
+
+void GeneralDevice::showReadback(dbCommon* record) {
+  auto& outputMode = *access_.outputMode(record);
+  // With closed_loop, record support would replace the value by that of DOL.
+  const auto before = std::exchange(outputMode, menuOmslsupervisory);
+  dbProcess(record);
+  outputMode = before;
+  // A disabled or simulated record has not posted the value.
+  if (std::exchange(stored_, std::nullopt)) db_post_events(record, nullptr, DBE_VALUE | DBE_LOG);
 }
 
 long GeneralDevice::take(dbCommon* record, const Message& message) {
@@ -164,12 +183,13 @@ void GeneralDevice::connectIO(dbCommon* record, const Connect& connect) {
   DevMpf::connectIO(record, connect);
 }
 
-// A value is written at the first connection only when PINI asked for it.
+// A value is written at the first connection only when PINI asked for it, and the record has not
+// written it already.
 void GeneralDevice::connectOutput(dbCommon* record) {
   const bool isFirst = !std::exchange(hasConnected_, true);
   if (options_.readback && !hasReadBack_ && !hasWritten_) {
     static_cast<void>(query(record, *options_.readback));
-  } else if ((isFirst && record->pini == menuPiniYES) || (options_.rewrite && hasWritten_)) {
+  } else if (hasWritten_ ? options_.rewrite : isFirst && processesAtStart(record)) {
     if (!record->pact) dbProcess(record);
   }
 }

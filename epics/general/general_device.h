@@ -6,6 +6,7 @@
 //   write      processes ─► startIO ─ value ───► PACT ── reply ──► completeIO: looks at the status
 //   subscribe  connected ─► request             each message ─► receiveReply ─► processes: stores
 //   readback   connected, until a reply ─► request     reply ─► receiveReply: stores ─► processes
+//              without DOL and without a write
 //
 //   subscription:  none ── request sent ──► requested ── disconnected, refused ──► none
 //
@@ -40,7 +41,11 @@ struct RecordAccess {
   void (*prepare)(dbCommon*, const LinkOptions&);
   Stored (*store)(dbCommon*, const MessageValue&, const LinkOptions&);
   //   scratch  holds the value when it has no field
-  MessageValue (*load)(const dbCommon*, const LinkOptions&, std::vector<double>& scratch);
+  //   returns  nullopt when a conversion or the bits of the link would change the value
+  std::optional<MessageValue> (*load)(const dbCommon*, const LinkOptions&,
+                                      std::vector<double>& scratch);
+  // OMSL of an output record.
+  epicsEnum16* (*outputMode)(dbCommon*);
 
   [[nodiscard]] bool isOutput() const noexcept { return load != nullptr; }
 };
@@ -71,6 +76,10 @@ class GeneralDevice final : public DevMpf {
   // Stores the value of a message in the record, or sets an alarm.
   long take(dbCommon* record, const Message& message);
   long repeatResult(dbCommon* record);
+  void takeReadback(dbCommon* record, const Message& message);
+  // Processes the record with the value that was read back; endReadback() stands for the write.
+  void showReadback(dbCommon* record);
+  long endReadback(dbCommon* record);
   long failStatus(dbCommon* record, std::int32_t status);
   void connectOutput(dbCommon* record);
 
@@ -81,7 +90,9 @@ class GeneralDevice final : public DevMpf {
   bool hasReadBack_ = false;
   bool hasWritten_ = false;
   std::optional<Message> pending_;  // the message that the record processes next
-  std::optional<Stored> stored_;  // the result of the last message of a subscription; none: failed
+  // the result of the last message of a subscription, or of a value that was read back until the
+  // record has processed with it; none: failed
+  std::optional<Stored> stored_;
   std::vector<double> scratch_;
 };
 

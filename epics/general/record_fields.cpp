@@ -7,6 +7,7 @@
 #include <dbScan.h>
 #include <limits>
 #include <menuConvert.h>
+#include <span>
 
 namespace mpf::fields {
 namespace {
@@ -30,10 +31,14 @@ std::optional<Integer> selected(const Value& value, const Options& options) {
 // 32 bits, as the signed number of an Int32 message.
 Value ofBits(std::uint32_t bits) { return std::int64_t{static_cast<std::int32_t>(bits)}; }
 
-Value placedInteger(std::int64_t number, const Options& options) {
+// nullopt: the number has bits that the link does not select.
+std::optional<Value> placedInteger(std::int64_t number, const Options& options) {
   if (!options.selectsBits()) return number;
-  return ofBits((static_cast<std::uint32_t>(number) << options.shift.value_or(0)) &
-                options.mask.value_or(UINT32_MAX));
+  const auto bits = toBits(number);
+  if (!bits) return std::nullopt;
+  const auto shift = options.shift.value_or(0);
+  const auto placed = (*bits << shift) & options.mask.value_or(UINT32_MAX);
+  return placed >> shift == *bits ? std::optional(ofBits(placed)) : std::nullopt;
 }
 
 template <class Record>
@@ -72,13 +77,31 @@ double engineeringOfRaw(aoRecord& record, std::int32_t raw) {
   return number;
 }
 
+// RVAL as a number without limits; RVAL itself is the largest or the smallest integer instead.
+double rawOf(const aoRecord& record) {
+  double number = record.oval;
+  if (record.linr == menuConvertLINEAR || record.linr == menuConvertSLOPE) {
+    number = record.eslo == 0 ? 0 : (number - record.eoff) / record.eslo;
+  } else if (record.linr != menuConvertNO_CONVERSION) {
+    void* table = record.pbrk;
+    short at = record.lbrk;
+    cvtEngToRawBpt(&number, record.linr, record.init, &table, &at);
+  }
+  return (number - record.aoff) / (record.aslo == 0 ? 1 : record.aslo) - record.roff;
+}
+
 // ---- bits
+
+template <class Record>
+std::uint32_t masked(const Record& record, std::uint32_t bits) {
+  return record.mask == 0 ? bits : bits & record.mask;
+}
 
 template <class Record>
 Stored storeBits(Record& record, const Value& value) {
   const auto bits = toBits(value);
   if (!bits) return Stored::doesNotFit;
-  record.rval = record.mask == 0 ? *bits : *bits & record.mask;
+  record.rval = masked(record, *bits);
   record.udf = FALSE;
   return Stored::done;
 }
@@ -97,8 +120,19 @@ void setFieldMask(Record& record, const Options& options) {
 }
 
 template <class Record>
-std::uint32_t unshifted(const Record& record) {
-  return record.shft > 31 ? 0 : record.rval >> record.shft;
+std::uint32_t unshifted(const Record& record, std::uint32_t raw) {
+  return record.shft > 31 ? 0 : raw >> record.shft;
+}
+
+// The state that has this value; without values of states, its number.
+std::optional<epicsEnum16> stateOf(const mbboRecord& record, std::uint32_t value) {
+  constexpr std::uint32_t kUnknownState = 65535;
+  if (record.sdef == FALSE)
+    return value < kUnknownState ? std::optional(static_cast<epicsEnum16>(value)) : std::nullopt;
+  const std::span states(&record.zrvl, 16);
+  const auto found = std::ranges::find(states, value);
+  if (found == states.end()) return std::nullopt;
+  return static_cast<epicsEnum16>(found - states.begin());
 }
 
 // ---- text
@@ -182,15 +216,17 @@ Stored store(int64outRecord& record, const Value& value, const Options& options)
   return storeInteger(record, value, options);
 }
 
-Value load(const aoRecord& record, const Options& options, Scratch& /*scratch*/) {
+std::optional<Value> load(const aoRecord& record, const Options& options, Scratch& /*scratch*/) {
   if (options.type == MessageType::int32 || options.type == MessageType::int32Array)
-    return placedInteger(record.rval, options);
+    return fit<epicsInt32>(rawOf(record)) ? placedInteger(record.rval, options) : std::nullopt;
   return (record.oval - record.aoff) / (record.aslo == 0 ? 1 : record.aslo);
 }
-Value load(const longoutRecord& record, const Options& options, Scratch& /*scratch*/) {
+std::optional<Value> load(const longoutRecord& record, const Options& options,
+                          Scratch& /*scratch*/) {
   return placedInteger(record.val, options);
 }
-Value load(const int64outRecord& record, const Options& options, Scratch& /*scratch*/) {
+std::optional<Value> load(const int64outRecord& record, const Options& options,
+                          Scratch& /*scratch*/) {
   return placedInteger(record.val, options);
 }
 
@@ -214,21 +250,20 @@ Stored store(boRecord& record, const Value& value, const Options& /*options*/) {
   return stored;
 }
 Stored store(mbboRecord& record, const Value& value, const Options& /*options*/) {
-  const auto stored = storeBits(record, value);
-  if (stored != Stored::done) return stored;
-  const auto raw = unshifted(record);
-  constexpr epicsUInt16 kUnknownState = 65535;
-  record.val = kUnknownState;
-  if (record.sdef == FALSE) record.val = static_cast<epicsEnum16>(raw);
-  constexpr int kStates = 16;
-  for (int state = kStates - 1; record.sdef != FALSE && state >= 0; --state)
-    if ((&record.zrvl)[state] == raw) record.val = static_cast<epicsEnum16>(state);
-  return record.val == kUnknownState ? Stored::doesNotFit : Stored::done;
+  const auto bits = toBits(value);
+  if (!bits) return Stored::doesNotFit;
+  const auto raw = masked(record, *bits);
+  const auto state = stateOf(record, unshifted(record, raw));
+  if (!state) return Stored::doesNotFit;
+  record.rval = raw;
+  record.val = *state;
+  record.udf = FALSE;
+  return Stored::done;
 }
 Stored store(mbboDirectRecord& record, const Value& value, const Options& /*options*/) {
   const auto stored = storeBits(record, value);
   if (stored != Stored::done) return stored;
-  record.val = static_cast<epicsInt32>(unshifted(record));
+  record.val = static_cast<epicsInt32>(unshifted(record, record.rval));
   constexpr int kBits = 32;
   for (int bit = 0; bit < kBits; ++bit)
     (&record.b0)[bit] = (static_cast<epicsUInt32>(record.val) >> bit) & 1;

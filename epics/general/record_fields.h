@@ -4,11 +4,12 @@
 //
 //   prepare(record, options)          sets MASK, SHFT, ESLO and EOFF as the link says
 //   store(record, value, options)     input records, and outputs that are read back
-//   load(record, options, scratch)    output records
+//   load(record, options, scratch)    output records; nullopt: the value does not fit
 //
 // Bits: RVAL of a bit record is the value & MASK, as with "Raw Soft Channel". A mask= of the link
 // is MASK itself; without one, NOBT bits from bit SHFT on. A longin and its kin with a mask= or
-// shift= have the selected bits as VAL: (value & mask) >> shift.
+// shift= have the selected bits as VAL: (value & mask) >> shift. A value with other bits does not
+// fit.
 #pragma once
 
 #include <aaiRecord.h>
@@ -28,6 +29,7 @@
 #include <mbbiRecord.h>
 #include <mbboDirectRecord.h>
 #include <mbboRecord.h>
+#include <optional>
 #include <stringinRecord.h>
 #include <stringoutRecord.h>
 #include <vector>
@@ -49,9 +51,9 @@ Stored store(longinRecord& record, const Value& value, const Options& options);
 Stored store(longoutRecord& record, const Value& value, const Options& options);
 Stored store(int64inRecord& record, const Value& value, const Options& options);
 Stored store(int64outRecord& record, const Value& value, const Options& options);
-Value load(const aoRecord& record, const Options& options, Scratch& scratch);
-Value load(const longoutRecord& record, const Options& options, Scratch& scratch);
-Value load(const int64outRecord& record, const Options& options, Scratch& scratch);
+std::optional<Value> load(const aoRecord& record, const Options& options, Scratch& scratch);
+std::optional<Value> load(const longoutRecord& record, const Options& options, Scratch& scratch);
+std::optional<Value> load(const int64outRecord& record, const Options& options, Scratch& scratch);
 void prepare(aiRecord& record, const Options& options);
 void prepare(aoRecord& record, const Options& options);
 

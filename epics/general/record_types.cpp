@@ -2,6 +2,7 @@
 // The device support tables of DTYP "MPF": one line for each record type.
 #include <dbAccess.h>
 #include <dbStaticLib.h>
+#include <optional>
 #include <vector>
 
 #include "epics/general/general_device.h"
@@ -44,12 +45,15 @@ constexpr RecordAccess accessOf() {
           [](dbCommon* record, const MessageValue& value, const LinkOptions& options) {
             return fields::store(*reinterpret_cast<Record*>(record), value, options);
           },
-      .load = nullptr};
-  if constexpr (kIsOutput<Record>)
+      .load = nullptr,
+      .outputMode = nullptr};
+  if constexpr (kIsOutput<Record>) {
     access.load = [](const dbCommon* record, const LinkOptions& options,
-                     std::vector<double>& scratch) {
+                     std::vector<double>& scratch) -> std::optional<MessageValue> {
       return fields::load(*reinterpret_cast<const Record*>(record), options, scratch);
     };
+    access.outputMode = [](dbCommon* record) { return &reinterpret_cast<Record*>(record)->omsl; };
+  }
   return access;
 }
 
