@@ -12,6 +12,7 @@
 #include <mpf/epics/classic.h>
 
 #include "classic/messages/transfer.h"
+#include "epics/record_queue.h"
 
 using mpf::classic::Transfer;
 
@@ -64,8 +65,11 @@ void DevMpf::bind() {
 
 int DevMpf::send(Message* message, replyType reply) try {
   const std::unique_ptr<Message> owned(message);
-  if (reply == replyTypeReceiveReply) sentTypes_[message->getClientExtra()] = message->getType();
-  return mpf::DevMpf::send(Transfer::send(*owned), reply) == 0 ? 0 : -1;
+  const auto type = owned->getType();
+  const auto extra = owned->getClientExtra();
+  if (mpf::DevMpf::send(Transfer::send(*owned), reply) != 0) return -1;
+  if (reply == replyTypeReceiveReply) sentTypes_.emplace(extra, type);
+  return 0;
 } catch (const std::exception& error) {
   errlogPrintf("a message cannot be sent to server \"%s\": %s\n", getServer().c_str(),
                error.what());
@@ -83,14 +87,21 @@ long DevMpf::completeIO(dbCommon* record, mpf::Message&& message) {
   return completeIO(record, received.release());
 }
 
+messageType DevMpf::takeSentType(const mpf::Message& message) {
+  const auto sent = sentTypes_.find(message.getClientExtra());
+  if (sent == sentTypes_.end()) return messageTypeInt32;
+  const auto type = sent->second;
+  if (mpf::endsRequest(message)) sentTypes_.erase(sent);
+  return type;
+}
+
 void DevMpf::receiveReply(dbCommon* record, mpf::Message&& message) {
+  const auto sentType = takeSentType(message);
   auto received = Transfer::receive(std::move(message));
   if (!received) {
     // NOLINTNEXTLINE(bugprone-use-after-move): receive() has left it unchanged
     const auto* fate = message.tryAs<mpf::RequestFate>();
-    const auto sent = sentTypes_.find(message.getClientExtra());
-    std::unique_ptr<Message> request(
-        Message::allocate(sent == sentTypes_.end() ? messageTypeInt32 : sent->second));
+    std::unique_ptr<Message> request(Message::allocate(sentType));
     request->setClientExtra(message.getClientExtra());
     received = Transfer::withFate(std::move(request),
                                   fate != nullptr ? fate->fate : mpf::Fate::outcomeUnknown);

@@ -38,11 +38,18 @@ class Probe : public DevMpf {
       auto* greeting = request(1);
       greeting->setClientExtra(7);
       send(greeting, replyTypeReceiveReply);
+      if (greetsTwice) {
+        auto* other = new Int32Message;
+        other->setClientExtra(7);
+        send(other, replyTypeReceiveReply);
+      }
     }
     DevMpf::connectIO(record, message);
   }
   void receiveReply(dbCommon*, Message* message) override {
-    received.set_value(std::unique_ptr<Message>(message));
+    std::unique_ptr<Message> owned(message);
+    if (!greetsTwice) return received.set_value(std::move(owned));
+    static_cast<void>(owned->getType() == messageTypeFloat64 ? ++float64s : ++int32s);
   }
   void outOfBandIO(dbCommon*, OutOfBandMessage* message) override {
     outOfBand = message->value;
@@ -54,6 +61,9 @@ class Probe : public DevMpf {
   static inline std::atomic<int> connections = 0;
   static inline std::atomic<int> outOfBand = 0;
   static inline std::atomic<bool> sendsMore = false;
+  static inline std::atomic<bool> greetsTwice = false;  // counts what it receives for them
+  static inline std::atomic<int> float64s = 0;
+  static inline std::atomic<int> int32s = 0;
 
  private:
   static Message* request(int address) {
@@ -79,6 +89,7 @@ class ClassicDevMpfTest : public EpicsTest {
     Probe::connections = 0;
     Probe::outOfBand = 0;
     Probe::sendsMore = false;
+    Probe::greetsTwice = false;
   }
   static std::string manual(const std::string& fields) {
     return "device(ai, VME_IO, devAiManual, \"manual\")\n"
@@ -187,6 +198,17 @@ TEST_F(ClassicDevMpfTest, ReceiveReplyGetsAMessageOfTheRequestsTypeWhenThereIsNo
   ASSERT_EQ(answer->getType(), messageTypeFloat64);
   EXPECT_EQ(static_cast<const ::Float64Message&>(*answer).status, fateRefused);
   EXPECT_EQ(answer->getClientExtra(), 7);
+}
+
+TEST_F(ClassicDevMpfTest, RequestsWithOneClientExtraKeepTheirTypes) {
+  Probe::greetsTwice = true;
+  const ThreadServer server(backplane_, "device", [](MessageServer&, Message&&) {});
+  const Ioc ioc(probe(""));
+
+  while (Probe::float64s + Probe::int32s < 2) std::this_thread::yield();
+
+  EXPECT_EQ(Probe::float64s, 1);
+  EXPECT_EQ(Probe::int32s, 1);
 }
 
 TEST_F(ClassicDevMpfTest, ConnectWaitWaitsForTheServer) {

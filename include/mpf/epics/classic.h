@@ -75,10 +75,12 @@ class DevMpf : public mpf::DevMpf {
   void receiveReply(dbCommon* record, mpf::Message&& message) final;
   void connectIO(dbCommon* record, const mpf::Connect& connect) final;
   void outOfBandIO(dbCommon* record, mpf::Message&& message) final;
+  // The type of the request that the message belongs to.
+  messageType takeSentType(const mpf::Message& message);
 
   bool isBound_ = false;
-  // Types of requests with replyTypeReceiveReply, by clientExtra.
-  std::map<int32, messageType> sentTypes_;
+  // Types of requests with replyTypeReceiveReply that have not ended, by clientExtra.
+  std::multimap<int32, messageType> sentTypes_;
 };
 
 // A device support table.
