@@ -17,7 +17,19 @@ std::int32_t locationOf(std::string_view text) {
   throw std::invalid_argument(fmt::format("location \"{}\" is not an integer", text));
 }
 
+// 0 to 30, or 100 * primary + secondary address.
+bool isGpibAddress(int number) noexcept {
+  constexpr int kLast = 30;
+  constexpr int kPerPrimary = 100;
+  const int primary = number / kPerPrimary;
+  const int secondary = number % kPerPrimary;
+  return number >= 0 && primary <= kLast && secondary <= kLast;
+}
+
 LinkAddress ofGpib(const gpibio& link) {
+  if (!isGpibAddress(link.addr))
+    throw std::invalid_argument(fmt::format(
+        "GPIB address {}: use 0 to 30, or 100 * primary + secondary address", link.addr));
   const auto bus = GpibLinks::instance().find(link.link);
   if (!bus) {
     throw std::invalid_argument(
@@ -53,6 +65,11 @@ LinkAddress LinkAddress::of(const DBLINK& link) {
     address.location = locationOf(std::string_view(address.server).substr(colon + 1));
     address.server.resize(colon);
   }
+  // Base has made an empty link of a text without the @.
+  if (address.server.empty())
+    throw std::invalid_argument(link.type == VME_IO
+                                    ? "no server: use #C<location> S<signal> @<server>"
+                                    : "no server: the link must begin with @<server>");
   SegmentName::checkServer(address.server);
   return address;
 }

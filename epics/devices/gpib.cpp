@@ -10,12 +10,14 @@
 // HiDEOSGpibLinkConfig gives a link its server (gpib_links.h). <address> is the primary address, or
 // 100 * primary + secondary address. Escapes in questions and formats are translated
 // ("\\n" in a database file is a line feed), and nothing is appended. An answer ends with END; its
-// final CR and LF are removed. The value of ai and longin is the first number of the answer. The
-// server waits at most 5 s.
+// final CR and LF are removed. The value of ai and longin is the first number of the answer, of a
+// longin rounded to the nearest integer. The server waits at most 5 s.
 //
 // Source  drvGpib of EPICS Base 3.13 for links and DTYP; the parameters are of this project.
 #include <aiRecord.h>
 #include <aoRecord.h>
+#include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <epicsString.h>
@@ -33,6 +35,7 @@
 #include "epics/common_fields.h"
 #include "epics/devices/string_parm/text_device.h"
 #include "epics/devices/string_parm/value_format.h"
+#include "epics/general/message_value.h"
 
 namespace mpf {
 namespace {
@@ -62,40 +65,40 @@ std::string translated(std::string_view text) {
 
 // ---- the fields of each record type
 
-bool tryStore(stringinRecord& record, const std::string& text) {
+// Functions that store an answer return the reason if they cannot; nullptr: stored.
+const char* store(stringinRecord& record, const std::string& text) {
   record.val[text.copy(record.val, sizeof record.val - 1)] = '\0';
-  return true;
+  return nullptr;
 }
-bool tryStore(lsiRecord& record, const std::string& text) {
+const char* store(lsiRecord& record, const std::string& text) {
   const auto size = text.copy(record.val, std::size_t{record.sizv} - 1);
   record.val[size] = '\0';
   record.len = static_cast<epicsUInt32>(size + 1);
-  return true;
+  return nullptr;
 }
+constexpr const char* kDoesNotFit = "the value does not fit the record";
 // The first number in the text.
-bool tryStore(aiRecord& record, const std::string& text) {
+template <class Number>
+const char* storeNumber(Number& field, const std::string& text) {
   constexpr auto* kFirst = "+-.0123456789";
   for (auto at = text.find_first_of(kFirst); at != std::string::npos;
        at = text.find_first_of(kFirst, at + 1)) {
     char* end = nullptr;
+    errno = 0;
     const auto value = std::strtod(text.c_str() + at, &end);
     if (end == text.c_str() + at) continue;
-    record.val = value;
-    return true;
+    const auto number = fit<Number>(value);
+    if (!number || (errno == ERANGE && std::isinf(value))) return kDoesNotFit;
+    field = *number;
+    return nullptr;
   }
-  return false;
+  return "the answer has no number";
 }
-bool tryStore(longinRecord& record, const std::string& text) {
-  constexpr auto* kFirst = "+-0123456789";
-  const ValueFormat<std::int32_t> format("%d", FormatUse::scan);
-  for (auto at = text.find_first_of(kFirst); at != std::string::npos;
-       at = text.find_first_of(kFirst, at + 1)) {
-    const auto value = format.scan(text.substr(at));
-    if (!value) continue;
-    record.val = *value;
-    return true;
-  }
-  return false;
+const char* store(aiRecord& record, const std::string& text) {
+  return storeNumber(record.val, text);
+}
+const char* store(longinRecord& record, const std::string& text) {
+  return storeNumber(record.val, text);
 }
 
 std::string printed(const aoRecord& record, const std::string& format) {
@@ -138,8 +141,9 @@ class GpibInput final : public TextDevice {
   long takeAnswer(dbCommon* common, TextAnswer answer) override {
     if (answer.status != gpib::gpibStatusOK) return fail(common, reasonOf(answer.status));
     const auto end = answer.text.find_last_not_of("\r\n");
-    if (!tryStore(*reinterpret_cast<Record*>(common), std::string(answer.text.substr(0, end + 1))))
-      return fail(common, "the answer has no number");
+    const std::string text(answer.text.substr(0, end + 1));
+    if (const auto* reason = store(*reinterpret_cast<Record*>(common), text))
+      return fail(common, reason);
     common->udf = FALSE;
     return MPF_NoConvert;
   }

@@ -36,10 +36,24 @@ bool tryRead(const Message& message, std::optional<Reading>& reading) {
 
 std::string_view untilZero(std::string_view text) { return text.substr(0, text.find('\0')); }
 
-std::optional<double> numberAtStart(std::string_view text) {
+// Without the blanks and the + in front of a number.
+std::string_view withoutSign(std::string_view text) {
   text = untilZero(text);
   text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n+"), text.size()));
+  return text;
+}
+
+std::optional<double> numberAtStart(std::string_view text) {
+  text = withoutSign(text);
   return tryTakeNumber<double>(text);
+}
+
+// nullopt also for a number with a fraction or an exponent.
+std::optional<std::int64_t> integerAtStart(std::string_view text) {
+  text = withoutSign(text);
+  const auto number = tryTakeNumber<std::int64_t>(text);
+  const bool isWhole = text.empty() || std::string_view(".eE").find(text[0]) == text.npos;
+  return isWhole ? number : std::nullopt;
 }
 
 // Calls `act` with each element, until it returns false.
@@ -183,6 +197,8 @@ std::optional<double> toDouble(const MessageValue& value) {
 
 std::optional<std::int64_t> toInteger(const MessageValue& value) {
   if (const auto* number = std::get_if<std::int64_t>(&value)) return *number;
+  const auto* text = std::get_if<std::string_view>(&value);
+  if (const auto integer = text != nullptr ? integerAtStart(*text) : std::nullopt) return integer;
   const auto number = toDouble(value);
   return number ? fit<std::int64_t>(*number) : std::nullopt;
 }

@@ -46,6 +46,16 @@ TEST(LinkAddress, HasTheLocationOfAnInstrumentLink) {
   EXPECT_EQ(instrument("dac").location, 0);
 }
 
+// Base makes an empty link of a text without @.
+TEST(LinkAddress, ALinkWithoutAServerMustBeginWithAnAt) {
+  try {
+    instrument("");
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "no server: the link must begin with @<server>");
+  }
+}
+
 TEST(LinkAddress, RefusesInvalidLinks) {
   EXPECT_THROW(vme(0, 0, ""), std::invalid_argument);
   EXPECT_THROW(vme(0, 0, std::string(100, 'x')), std::invalid_argument);

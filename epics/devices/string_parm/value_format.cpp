@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "epics/devices/string_parm/value_format.h"
 
-#include <algorithm>
+#include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
-#include <limits>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 namespace mpf {
 namespace {
@@ -121,10 +122,13 @@ std::string printed(const std::string& format, Argument argument) {
   return text;
 }
 
+// nullopt also for a number that the argument cannot hold; one that is almost 0 is 0.
 template <class Argument>
 std::optional<Argument> scanned(const std::string& format, const std::string& text) {
   Argument argument{};
+  errno = 0;
   if (std::sscanf(text.c_str(), format.c_str(), &argument) != 1) return std::nullopt;
+  if (errno == ERANGE && !(std::abs(static_cast<double>(argument)) < 1)) return std::nullopt;
   return argument;
 }
 // NOLINTEND(cppcoreguidelines-pro-type-vararg,hicpp-vararg,cert-err34-c)
@@ -171,12 +175,15 @@ std::optional<Value> ValueFormat<Value>::scan(const std::string& text) const {
     return scanned<double>(format_, text);
   } else if (isUnsigned(conversion_)) {
     const auto value = scanned<unsigned long long>(format_, text);
-    return value ? std::optional(static_cast<Value>(*value)) : std::nullopt;
+    // A negative number is scanned as the unsigned number with the same bits.
+    if (!value || !(std::in_range<std::uint32_t>(*value) ||
+                    std::in_range<Value>(static_cast<long long>(*value))))
+      return std::nullopt;
+    return static_cast<Value>(*value);
   } else {
-    using Limits = std::numeric_limits<Value>;
     const auto value = scanned<long long>(format_, text);
-    if (!value) return std::nullopt;
-    return static_cast<Value>(std::clamp<long long>(*value, Limits::min(), Limits::max()));
+    return value && std::in_range<Value>(*value) ? std::optional(static_cast<Value>(*value))
+                                                 : std::nullopt;
   }
 }
 

@@ -25,11 +25,12 @@ class ValueFormat {
   ValueFormat(std::string_view format, FormatUse use);
 
   [[nodiscard]] std::string print(Value value) const;
-  //   returns  nullopt when the text does not match, or the format has no conversion
+  //   returns  nullopt when the text does not match, the number does not fit, or the format has no
+  //            conversion; %x and its kin: also 32 bits of an unsigned number
   [[nodiscard]] std::optional<Value> scan(const std::string& text) const;
 
  private:
-  std::string format_;    // with the length modifier of the type that is passed
+  std::string format_;  // with the length modifier of the type that is passed
   char conversion_ = 0;  // 0: the format has no conversion
 };
 

@@ -64,7 +64,36 @@ TEST_F(GpibRecordTest, TheFirstNumberMayFollowADashOrAPoint) {
                             kDtyp));
 
   Ioc::waitFor("v", "1.5");
-  Ioc::waitFor("n", "1");
+  Ioc::waitFor("n", "2");  // rounded
+}
+
+TEST_F(GpibRecordTest, ALonginRoundsTheNumber) {
+  const FakeSerial server(backplane_, "-8.874270409E-01\r\n");
+  const Ioc ioc(input("longin", "#L10 A1 @?"));
+
+  Ioc::waitFor("v", "-1");
+}
+
+TEST_F(GpibRecordTest, ANumberThatDoesNotFitIsAnAlarmAndTheFieldKeepsItsValue) {
+  for (const std::string type : {"ai", "longin"}) {
+    SCOPED_TRACE(type);
+    const FakeSerial server(backplane_, type == "ai" ? "1e999" : "3000000000");
+    const Ioc ioc(input(type.c_str(), "#L10 A1 @?", "field(VAL, \"7\")"));
+
+    Ioc::waitFor("v.AMSG", "the value does not fit the record");
+
+    EXPECT_EQ(Ioc::get("v"), "7");
+    EXPECT_EQ(Ioc::get("v.SEVR"), "INVALID");
+  }
+}
+
+TEST_F(GpibRecordTest, AnAddressThatCannotExistIsRefused) {
+  for (const char* link : {"#L10 A31 @?", "#L10 A-5 @?", "#L10 A2231 @?", "#L10 A3100 @?"}) {
+    SCOPED_TRACE(link);
+    const Ioc ioc(input("ai", link));
+    EXPECT_EQ(Ioc::get("v.PACT"), "1");
+    EXPECT_EQ(Ioc::get("v.STAT"), "LINK");
+  }
 }
 
 TEST_F(GpibRecordTest, ALongAnswerIsNotCut) {

@@ -34,6 +34,9 @@ TEST(MessageValue, RoundsAndRefusesWhatDoesNotFit) {
 TEST(MessageValue, ConvertsTextToTheNumberAtItsStart) {
   EXPECT_EQ(toDouble(text(" +2.5e1 V\r\n")), 25);
   EXPECT_EQ(toInteger(text("-7")), -7);
+  EXPECT_EQ(toInteger(text("9007199254740993")), 9007199254740993);
+  EXPECT_EQ(toInteger(text("2.5e1 V")), 25);
+  EXPECT_EQ(toInteger(text("1e999")), std::nullopt);
   EXPECT_EQ(toDouble(text("V 3")), std::nullopt);
   EXPECT_EQ(toDouble(text("")), std::nullopt);
   EXPECT_EQ(toDouble(text(std::string_view("\0005", 2))), std::nullopt);

@@ -2,6 +2,7 @@
 #include "epics/devices/string_parm/value_format.h"
 
 #include <gtest/gtest.h>
+#include <limits>
 #include <stdexcept>
 
 namespace mpf::test {
@@ -44,9 +45,24 @@ TEST(ValueFormat, ScansAsScanf) {
   EXPECT_EQ(scan("%*s %*d %lf", "abc 3 7"), 7);
   EXPECT_EQ(scan("Temperature", "Temperature"), std::nullopt) << "no conversion";
   EXPECT_EQ(scanLong("%d", "-12"), -12);
-  EXPECT_EQ(scanLong("%ld", "99999999999"), 2147483647);
   EXPECT_EQ(scanLong("%x", "ffffffff"), -1);
+  EXPECT_EQ(scanLong("%x", "-1"), -1);
   EXPECT_EQ(scanLong("%2d", "1234"), 12);
+}
+
+TEST(ValueFormat, ScansNoNumberThatDoesNotFit) {
+  EXPECT_EQ(scanLong("%d", "2147483647"), 2147483647);
+  EXPECT_EQ(scanLong("%d", "2147483648"), std::nullopt);
+  EXPECT_EQ(scanLong("%ld", "99999999999"), std::nullopt);
+  EXPECT_EQ(scanLong("%d", "99999999999999999999"), std::nullopt);
+  EXPECT_EQ(scanLong("%d", "-99999999999999999999"), std::nullopt);
+  EXPECT_EQ(scanLong("%x", "1FFFFFFFF"), std::nullopt);
+  EXPECT_EQ(scanLong("%x", "1FFFFFFFFFFFFFFFFF"), std::nullopt);
+  EXPECT_EQ(scanLong("%x", "-1FFFFFFFF"), std::nullopt);
+  EXPECT_EQ(scan("%lf", "1e999"), std::nullopt);
+  EXPECT_EQ(scan("%lf", "-1e999"), std::nullopt);
+  EXPECT_EQ(scan("%lf", "1e-999"), 0);
+  EXPECT_EQ(scan("%lf", "inf"), std::numeric_limits<double>::infinity());
 }
 
 TEST(ValueFormat, RefusesFormatsWithoutDefinedBehaviour) {
