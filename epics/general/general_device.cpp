@@ -26,8 +26,14 @@ LinkOptions optionsOf(const dbCommon* record, const DBLINK& link, const RecordAc
   const auto type = access.type(record);
   if (type == MessageType::none) throw std::invalid_argument("FTVL=STRING: use CHAR or a number");
   const auto inputMode = record->scan == SCAN_IO_EVENT ? Mode::subscribe : Mode::read;
-  return LinkOptions::parse(LinkAddress::of(link).parameters,
-                            {.type = type, .mode = access.isOutput() ? Mode::write : inputMode});
+  const auto options = LinkOptions::parse(LinkAddress::of(link).parameters,
+                                          {.type = type,
+                                           .mode = access.isOutput() ? Mode::write : inputMode,
+                                           .canHaveBits = access.canHaveBits});
+  if (!makeQuery(options, options.cmd))
+    throw std::invalid_argument(
+        fmt::format("value={} does not fit type={}", options.value, toString(options.type)));
+  return options;
 }
 
 // Whether the server has not received the request in time; it may be busy or stopped.
@@ -74,16 +80,13 @@ long GeneralDevice::startIO(dbCommon* record) {
   switch (options_.mode) {
     case Mode::write:
       return stored_ ? endReadback(record) : write(record);
-    case Mode::read: {
-      auto request = makeQuery(options_, options_.cmd);
-      return request ? sendReply(std::move(*request))
-                     : fail(record, "value= does not fit the type");
-    }
+    case Mode::read:
+      return sendReply(makeQuery(options_, options_.cmd).value());
     case Mode::subscribe:
       break;
   }
   if (pending_) return take(record, *std::exchange(pending_, std::nullopt));
-  if (subscription_ == Subscription::none) subscribe(record);
+  if (subscription_ == Subscription::none) subscribe();
   return subscription_ == Subscription::none ? -1 : repeatResult(record);
 }
 
@@ -95,14 +98,12 @@ long GeneralDevice::write(dbCommon* record) {
   return sendReply(std::move(*request));
 }
 
-long GeneralDevice::query(dbCommon* record, std::int32_t cmd) {
-  auto request = makeQuery(options_, cmd);
-  return request ? send(std::move(*request), replyTypeReceiveReply)
-                 : fail(record, "value= does not fit the type");
+long GeneralDevice::query(std::int32_t cmd) {
+  return send(makeQuery(options_, cmd).value(), replyTypeReceiveReply);
 }
 
-void GeneralDevice::subscribe(dbCommon* record) {
-  const bool isSent = query(record, options_.cmd) == 0;
+void GeneralDevice::subscribe() {
+  const bool isSent = query(options_.cmd) == 0;
   subscription_ = isSent ? Subscription::requested : Subscription::none;
 }
 
@@ -115,7 +116,7 @@ long GeneralDevice::completeIO(dbCommon* record, Message&& message) {
 
 void GeneralDevice::receiveReply(dbCommon* record, Message&& message) {
   if (options_.mode == Mode::write) return takeReadback(record, message);
-  if (isExpired(message)) return subscribe(record);
+  if (isExpired(message)) return subscribe();
   pending_ = std::move(message);
   if (!record->pact) dbProcess(record);  // a disabled or simulated record uses it later
 }
@@ -126,7 +127,7 @@ void GeneralDevice::takeReadback(dbCommon* record, const Message& message) {
   static_cast<void>(take(record, message));
   if (stored_) showReadback(record);
   else postAlarm(record);
-  if (isExpired(message)) static_cast<void>(query(record, *options_.readback));
+  if (isExpired(message)) static_cast<void>(query(*options_.readback));
 }
 
 long GeneralDevice::endReadback(dbCommon* record) {
@@ -179,7 +180,7 @@ void GeneralDevice::connectIO(dbCommon* record, const Connect& connect) {
     pending_.reset();
   }
   if (isConnected && options_.mode == Mode::write) return connectOutput(record);
-  if (isConnected && options_.mode == Mode::subscribe) return subscribe(record);
+  if (isConnected && options_.mode == Mode::subscribe) return subscribe();
   DevMpf::connectIO(record, connect);
 }
 
@@ -188,7 +189,7 @@ void GeneralDevice::connectIO(dbCommon* record, const Connect& connect) {
 void GeneralDevice::connectOutput(dbCommon* record) {
   const bool isFirst = !std::exchange(hasConnected_, true);
   if (options_.readback && !hasReadBack_ && !hasWritten_) {
-    static_cast<void>(query(record, *options_.readback));
+    static_cast<void>(query(*options_.readback));
   } else if (hasWritten_ ? options_.rewrite : isFirst && processesAtStart(record)) {
     if (!record->pact) dbProcess(record);
   }

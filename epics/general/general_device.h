@@ -37,6 +37,7 @@ namespace mpf {
 struct RecordAccess {
   // The type of messages unless the link has one; none when the record can have no value.
   MessageType (*type)(const dbCommon*);
+  bool canHaveBits;  // mask= and shift= of the link
   // Sets fields of the record that follow from the link.
   void (*prepare)(dbCommon*, const LinkOptions&);
   Stored (*store)(dbCommon*, const MessageValue&, const LinkOptions&);
@@ -71,8 +72,8 @@ class GeneralDevice final : public DevMpf {
 
   long write(dbCommon* record);
   // Sends a request whose replies arrive at receiveReply().
-  long query(dbCommon* record, std::int32_t cmd);
-  void subscribe(dbCommon* record);
+  long query(std::int32_t cmd);
+  void subscribe();
   // Stores the value of a message in the record, or sets an alarm.
   long take(dbCommon* record, const Message& message);
   long repeatResult(dbCommon* record);

@@ -137,6 +137,14 @@ const Key& keyNamed(std::string_view name, bool isOutput) {
                                           fmt::join(names, ", ")));
 }
 
+// Whether a record can use mask= and shift=: not with floating-point numbers, which have no bits.
+// Text may be an integer, but ai and ao take it as a floating-point number.
+bool canSelectBits(MessageType type, const LinkOptions::Defaults& defaults) {
+  if (!defaults.canHaveBits) return false;
+  return type == MessageType::int32 || type == MessageType::int32Array ||
+         (type == MessageType::char8Array && defaults.type == MessageType::int32);
+}
+
 }  // namespace
 
 LinkOptions LinkOptions::parse(std::string_view text, const Defaults& defaults) {
@@ -157,6 +165,9 @@ LinkOptions LinkOptions::parse(std::string_view text, const Defaults& defaults) 
     seen.push_back(&key);
     key.set(options, key.name, pair.substr(equals + 1));
   }
+  if (options.selectsBits() && !canSelectBits(options.type, defaults))
+    throw std::invalid_argument(
+        "mask=, shift=: use them with type=int32, in a record of a number or of bits");
   return options;
 }
 

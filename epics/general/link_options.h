@@ -28,6 +28,7 @@ struct LinkOptions {
   struct Defaults {
     MessageType type = MessageType::int32;
     Mode mode = Mode::read;  // Mode::write for output records
+    bool canHaveBits = true;  // of numbers and bits, not of text, arrays and events
   };
 
   MessageType type = MessageType::int32;  // of requests

@@ -34,9 +34,14 @@ template <class Record>
 constexpr bool kIsOutput = requires(Record record) { record.out; };
 
 template <class Record>
+constexpr bool kCanHaveBits =
+    requires(Record record) { record.rval; } || std::is_integral_v<decltype(Record::val)>;
+
+template <class Record>
 constexpr RecordAccess accessOf() {
   RecordAccess access{
       .type = typeOf<Record>,
+      .canHaveBits = kCanHaveBits<Record>,
       .prepare =
           [](dbCommon* record, const LinkOptions& options) {
             fields::prepare(*reinterpret_cast<Record*>(record), options);

@@ -40,7 +40,8 @@ TEST_F(GeneralDeviceTest, ARequestHasTheFieldsOfTheLink) {
 }
 
 TEST_F(GeneralDeviceTest, AnInvalidLinkDisablesTheRecord) {
-  for (const char* link : {"@s adress=3", "@s cmd=x", "@", "@s mode=write"}) {
+  for (const char* link : {"@s adress=3", "@s cmd=x", "@", "@s mode=write", "s cmd=1",
+                           "@s type=float64 shift=1", "@s value=1e99"}) {
     SCOPED_TRACE(link);
     const Ioc ioc(longin(link));
 

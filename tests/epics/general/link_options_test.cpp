@@ -81,6 +81,7 @@ TEST(LinkOptions, ErrorsNameTheKeyAndWhatIsValid) {
            Invalid{"mask=0", "mask=0: use an integer from 1 to 4294967295"},
            Invalid{"shift=32", "shift=32: use an integer from 0 to 31"},
            Invalid{"range=1:1", "range=1:1: use <low>:<high>, two different numbers"},
+           Invalid{"type=float64 mask=3", "mask=, shift=: use them with type=int32"},
            Invalid{"range=5", "range=5: use <low>:<high>"},
            Invalid{"cmd", "\"cmd\": use <key>=<value>"},
            Invalid{"cmd=1 cmd=2", "cmd appears twice; write it once"},

@@ -196,6 +196,61 @@ TEST_F(GeneralRecordTest, EachOutputRecordWritesItsValue) {
   }
 }
 
+TEST_F(GeneralRecordTest, AnOutputThatDoesNotFitTheMessageOrTheBitsIsNotWritten) {
+  Writes writes;
+  const ThreadServer server(backplane_, "out", std::ref(writes));
+  struct Output {
+    const char* type;
+    const char* parameters;
+    const char* fields;
+    const char* put;
+    const char* status = "WRITE";
+  };
+  const std::vector<Output> outputs{
+      {"ao", "type=int32", "", "1e12"},
+      {"ao", "type=int32", "", "nan", "UDF"},
+      {"ao", "type=int32 range=0:4000",
+       "field(LINR, \"LINEAR\") field(EGUL, \"-10\") field(EGUF, \"10\")", "-1e9"},
+      {"ao", "type=int32 mask=0xff", "", "256"},
+      {"longout", "mask=0xff shift=4", "", "8191"},
+      {"longout", "mask=0xff", "", "-1"},
+      {"int64out", "shift=1", "", "4294967296"}};
+  std::string database;
+  for (std::size_t at = 0; at < outputs.size(); ++at)
+    database += record(outputs[at].type, "o" + std::to_string(at),
+                       "out address=" + std::to_string(at) + " " + outputs[at].parameters,
+                       std::string("field(PINI, \"YES\") field(VAL, \"0\") ") + outputs[at].fields);
+  const Ioc ioc(database);
+
+  for (std::size_t at = 0; at < outputs.size(); ++at) {
+    const auto name = "o" + std::to_string(at);
+    SCOPED_TRACE(std::string(outputs[at].type) + " " + outputs[at].parameters);
+    Ioc::waitFor(name + ".STAT", "NO_ALARM");
+    Ioc::waitFor(name + ".PACT", "0");
+    const auto written = writes.at(static_cast<std::int32_t>(at));
+    static_cast<void>(Ioc::put(name, outputs[at].put));
+    EXPECT_EQ(Ioc::get(name + ".STAT"), outputs[at].status);
+    EXPECT_EQ(Ioc::get(name + ".SEVR"), "INVALID");
+    EXPECT_EQ(Ioc::get(name + ".PACT"), "0");
+    EXPECT_EQ(writes.at(static_cast<std::int32_t>(at)), written);
+  }
+}
+
+// mask= and shift= of records that have no bits.
+TEST_F(GeneralRecordTest, BitsOfTextArraysAndFloatingPointNumbersAreRefused) {
+  const Ioc ioc(
+      readAtStart("ai", "ai", "mask=3") + readAtStart("ai", "text", "type=char8Array mask=3") +
+      readAtStart("stringin", "string", "type=int32 shift=3") +
+      readAtStart("waveform", "wave", "mask=3", "field(FTVL, \"LONG\")") +
+      readAtStart("event", "event", "mask=3") + readAtStart("ai", "raw", "type=int32 mask=3") +
+      readAtStart("longin", "number", "type=char8Array mask=3"));
+
+  for (const std::string refused : {"ai", "text", "string", "wave", "event"})
+    EXPECT_EQ(Ioc::get(refused + ".STAT"), "LINK") << refused;
+  EXPECT_EQ(Ioc::get("raw.STAT"), "COMM");
+  EXPECT_EQ(Ioc::get("number.STAT"), "COMM");
+}
+
 // The digital I/O server: polled, and with a monitor for each record.
 TEST_F(GeneralRecordTest, MbbiDirectRecordsReadAndMonitorBitsOfDigitalInputs) {
   const ThreadServer server(backplane_, "c-UnidigIn", [](MessageServer& self, Message&& request) {
