@@ -29,6 +29,8 @@
 //   further replies ─► the record processes again: completeIO()
 //   connected ─► connectIO() ─► a record that has processed before processes again
 //   disconnected ─► connectIO() ─► alarm COMM, INVALID, without processing
+//   with `ioInterrupt`, the process of the server is stopped, or runs again ─► a record that has
+//     processed before processes again: alarm COMM, INVALID, or startIO()
 //
 // All records of an IOC share one dispatcher, and records that name the same server share one
 // connection; a record with `ioInterrupt` has its own, because a server may keep one subscription
@@ -39,8 +41,9 @@
 // Threads  EPICS calls the virtual functions with the record locked (dbScanLock), on a thread that
 //          processes records or on a callback thread. Call send() only in them.
 // Errors   a record whose request has no reply gets an alarm with severity INVALID: TIMEOUT (no
-//          reply in time), COMM (no connection, connection lost), READ or WRITE (the server refused
-//          the request, a queue is full, not a message of the expected type). AMSG has the reason.
+//          reply in time), COMM (no connection, connection lost, server stopped), READ or WRITE
+//          (the server refused the request, a queue is full, not a message of the expected type).
+//          AMSG has the reason.
 // Owner    the object belongs to the record; it lives until the IOC ends.
 // Source   manual, "MPF Device support", "EXAMPLE Implementation: ip330Scan".
 #pragma once
