@@ -41,10 +41,18 @@ std::optional<Value> placedInteger(std::int64_t number, const Options& options) 
   return placed >> shift == *bits ? std::optional(ofBits(placed)) : std::nullopt;
 }
 
+// Record support would replace another value that was read back by the limit.
+template <class Record>
+bool isWithinDriveLimits(const Record& record, decltype(record.val) number) {
+  if constexpr (requires { record.drvh; })
+    return record.drvh <= record.drvl || !(number < record.drvl || number > record.drvh);
+  else return true;
+}
+
 template <class Record>
 Stored storeInteger(Record& record, const Value& value, const Options& options) {
   const auto number = selected<decltype(record.val)>(value, options);
-  if (!number) return Stored::doesNotFit;
+  if (!number || !isWithinDriveLimits(record, *number)) return Stored::doesNotFit;
   record.val = *number;
   record.udf = FALSE;
   return Stored::done;
@@ -197,7 +205,7 @@ Stored store(aoRecord& record, const Value& value, const Options& options) {
   } else if (const auto sample = toDouble(value)) {
     number = adjusted(record, *sample);
   }
-  if (!number) return Stored::doesNotFit;
+  if (!number || !isWithinDriveLimits(record, *number)) return Stored::doesNotFit;
   record.val = record.oval = record.pval = *number;
   record.udf = std::isnan(*number);
   return Stored::done;

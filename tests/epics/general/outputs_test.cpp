@@ -72,6 +72,20 @@ TEST_F(GeneralOutputTest, AValueThatWasReadBackIsNotReplacedByThatOfDol) {
   Ioc::waitFor("v", "3000");
 }
 
+TEST_F(GeneralOutputTest, AValueOutsideTheDriveLimitsThatIsReadBackIsAnAlarm) {
+  const Register server(backplane_);
+  const std::string limits = "field(VAL, \"4\") field(DRVL, \"0\") field(DRVH, \"10\")";
+  const Ioc ioc(longout("@s readback=7", limits) +
+                "record(ao, \"a\") { field(DTYP, \"MPF\") "
+                "field(OUT, \"@s type=int32 readback=7\") " +
+                limits + " }\n");
+
+  for (const std::string name : {"v", "a"}) {
+    Ioc::waitFor(name + ".AMSG", "the value does not fit the record");
+    EXPECT_EQ(Ioc::get(name), "4");
+  }
+}
+
 TEST_F(GeneralOutputTest, AnMbboKeepsItsValueWhenAnUnknownStateIsReadBack) {
   const Register server(backplane_);
   const Ioc ioc(
