@@ -96,7 +96,6 @@ std::string SyncClient::detailsOf(SendResult refusal, const Message& notSent) co
     return fmt::format(": {} bytes, the limit is {}", notSent.body().size(),
                        client_.maxMessageBytes());
   if (refusal != SendResult::notConnected) return {};
-  if (client_.isInherited()) return ": the client was made before a fork; make one in this process";
   const auto because = client_.notConnectedBecause();
   return because.empty() ? "" : ": " + because;
 }
