@@ -33,15 +33,15 @@ std::string chosenCommand(const CLI::App& app) {
   return name;
 }
 
-// Adds the exit statuses to the --help text of `app` and its subcommands. The man pages are
-// generated from that text.
-void addExitStatus(CLI::App& app) {
-  auto footer = app.get_footer();
-  if (footer.find("Exit status") == std::string::npos) {
-    app.footer(footer + (footer.empty() ? "" : "\n") +
-               "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.");
-  }
-  for (auto* command : app.get_subcommands([](CLI::App*) { return true; })) addExitStatus(*command);
+// Adds the exit statuses to the --help text of `app` and its subcommands, which have those of `app`
+// unless they have their own. The man pages are generated from that text.
+void addExitStatus(CLI::App& app, std::string status) {
+  const auto footer = app.get_footer();
+  if (const auto at = footer.find("Exit status"); at != std::string::npos)
+    status = footer.substr(at);
+  else app.footer(footer + (footer.empty() ? "" : "\n") + status);
+  for (auto* command : app.get_subcommands([](CLI::App*) { return true; }))
+    addExitStatus(*command, status);
 }
 
 int explain(const CLI::App& app, const CLI::ParseError& error) {
@@ -90,7 +90,7 @@ CLI::Validator inRange(Number least, Number most, const char* kind,
 }  // namespace
 
 std::optional<int> parseCommandLine(CLI::App& app, int argc, const char* const* argv) try {
-  addExitStatus(app);
+  addExitStatus(app, "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.");
   app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), kVersion),
                        "Print the version");
   app.parse(argc, argv);

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "base/output_file.h"
-#include "base/print_error.h"
 #include "base/toml/config_errors.h"
 #include "crate/commands/commands.h"
 #include "crate/commands/crate_source.h"
@@ -30,7 +29,7 @@ void writeFile(const std::filesystem::path& path, const std::string& text) {
   fmt::print("{} is written\n", path.string());
 }
 
-int convert(const ConvertArguments& arguments) try {
+int convert(const ConvertArguments& arguments) {
   const auto& source = arguments.source;
   if (!source.isStartupFile())
     throw std::invalid_argument(
@@ -49,9 +48,6 @@ int convert(const ConvertArguments& arguments) try {
                                          "Start it with: mpf run {0}.toml",
                                          name, source.file())));
   return 0;
-} catch (const ConfigError& error) {
-  printError("{}\n", error.what());
-  return 2;
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 #include "base/output_file.h"
 #include "base/print_error.h"
-#include "base/toml/config_errors.h"
+#include "crate/config/check_start.h"
 #include "crate/config/read_crate.h"
 #include "crate/supervisor/crate_folder.h"
 
@@ -76,12 +76,28 @@ startup::Startup CrateSource::readStartup(const std::string& iocFile, bool usesM
 
 Crate CrateSource::read() const {
   if (isStartupFile()) return readStartup(kIocFile, false).crate;
+  ConfigErrors errors;
+  auto crate = readFile(errors);
+  errors.throwIfAny();
+  return crate;
+}
+
+Crate CrateSource::check() const {
+  if (isStartupFile()) return read();
+  ConfigErrors errors;
+  auto crate = readFile(errors);
+  checkStart(crate, errors);
+  errors.throwIfAny();
+  return crate;
+}
+
+Crate CrateSource::readFile(ConfigErrors& errors) const {
   if (!address_.empty() || !symbols_.empty())
     throw ConfigError(
         fmt::format("{} is a crate file; --address and --define are for startup "
                     "files: change the crate file instead",
                     file_));
-  auto crate = readCrate(file_);
+  auto crate = readCrate(file_, errors);
   if (!name_.empty()) crate.name = checkedName(name_);
   const auto kinds = carrierKinds();
   for (auto& carrier : crate.carriers) {
@@ -93,7 +109,7 @@ Crate CrateSource::read() const {
 }
 
 Crate CrateSource::prepare() const {
-  if (!isStartupFile()) return read();
+  if (!isStartupFile()) return check();
   const auto folder = CrateFolder::of(readStartup(kIocFile, false).crate.name);
   auto startup = readStartup(folder.file(kIocFile), false);
   if (!startup.iocText.empty()) {

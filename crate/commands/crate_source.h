@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/toml/config_errors.h"
 #include "crate/config/crate.h"
 #include "crate/startup/commands/read_startup.h"
 
@@ -27,8 +28,9 @@ class CrateSource {
   // Reads the crate.
   //   throws  ConfigError with all errors
   [[nodiscard]] Crate read() const;
-  // Reads the crate and, if it comes from a startup file, writes the commands for its IOC into the
-  // folder of the crate.
+  // The same, and checks that this host can start the processes of a crate file.
+  [[nodiscard]] Crate check() const;
+  // The same, and writes the commands for the IOC of a startup file into the folder of the crate.
   [[nodiscard]] Crate prepare() const;
   // Reads a startup file.
   //   iocFile        where the commands for its IOC will be
@@ -36,6 +38,7 @@ class CrateSource {
   [[nodiscard]] startup::Startup readStartup(const std::string& iocFile, bool usesModels) const;
 
  private:
+  [[nodiscard]] Crate readFile(ConfigErrors& errors) const;
   // The kinds of --carrier by name; "" is for all others.
   [[nodiscard]] std::map<std::string, std::string> carrierKinds() const;
 

@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <memory>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "base/output_file.h"
-#include "base/print_error.h"
-#include "base/toml/config_errors.h"
 #include "crate/commands/commands.h"
 #include "crate/commands/crate_source.h"
 #include "crate/config/crate_schema.h"
@@ -48,24 +48,26 @@ Crate showStartup(const RunArguments& arguments) {
 // Prints what the file means, without starting anything.
 void show(const RunArguments& arguments) {
   const auto& source = arguments.source;
-  const auto crate = source.isStartupFile() ? showStartup(arguments) : source.read();
+  const auto crate = source.isStartupFile() ? showStartup(arguments)
+                     : arguments.checkOnly  ? source.check()
+                                            : source.read();
   if (arguments.dryRun) printPlans(crate);
   else fmt::print("{}: {} processes, no error\n", source.file(), crate.processes.size());
 }
 
-int runCrate(const RunArguments& arguments) try {
+int runCrate(const RunArguments& arguments) {
   if (arguments.checkOnly || arguments.dryRun) {
     show(arguments);
     return 0;
   }
-  const auto load = [source = arguments.source] { return source.prepare(); };
   if (arguments.source.isStartupFile())
     printDiagnostics(arguments.source.readStartup("", false).diagnostics, false);
-  Supervisor(folderOf(load()), load).run();
+  const auto crate = arguments.source.prepare();
+  const auto load = [source = arguments.source, first = std::optional(crate)]() mutable {
+    return first ? *std::exchange(first, std::nullopt) : source.prepare();
+  };
+  Supervisor(folderOf(crate), load).run();
   return 0;
-} catch (const ConfigError& error) {
-  printError("{}\n", error.what());
-  return 2;
 }
 
 constexpr const char* kNewCrate =

@@ -22,7 +22,7 @@ bool isFileName(const std::string& name) {
 
 class CrateCheck {
  public:
-  CrateCheck(const Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
+  CrateCheck(Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
 
   void run() {
     if (const auto problem = problemOfName(crate_.name); !problem.empty())
@@ -31,12 +31,14 @@ class CrateCheck {
       errors_.add(crate_.file,
                   "the crate starts nothing; write a [[server]], [[router]], [[ioc]] "
                   "or [[program]]");
-    for (const auto& process : crate_.processes) {
+    for (auto& process : crate_.processes) {
+      const auto errorsBefore = errors_.lines().size();
       checkName(process);
       checkRequired(process);
       checkNeeds(process);
       checkServers(process);
       checkModules(process);
+      process.isSound = process.isSound && errors_.lines().size() == errorsBefore;
     }
     checkCycles();
   }
@@ -166,7 +168,7 @@ class CrateCheck {
     return false;
   }
 
-  const Crate& crate_;
+  Crate& crate_;
   ConfigErrors& errors_;
   std::map<std::string, const Process*> names_;
   std::map<std::string, const Process*> servers_;
@@ -183,6 +185,6 @@ std::string problemOfName(const std::string& name) {
       name);
 }
 
-void checkCrate(const Crate& crate, ConfigErrors& errors) { CrateCheck(crate, errors).run(); }
+void checkCrate(Crate& crate, ConfigErrors& errors) { CrateCheck(crate, errors).run(); }
 
 }  // namespace mpf::crate

@@ -67,6 +67,7 @@ struct Process {
   std::string workingFolder;  // empty: the folder of the crate file
   std::optional<std::int32_t> location;  // nothing: that of the crate
   Supervision supervision;
+  bool isSound = true;  // no error was found in its table
   std::string place;  // of the table
   std::map<std::string, std::string> places;  // of its keys
   std::string comment;  // text that writeCrate() puts above the table; lines without "# "
@@ -111,6 +112,7 @@ struct Crate {
   int maxCapsules = 100;
   std::uint64_t maxCapsuleBytes = 100u << 20;
   std::uint64_t maxLogBytes = 10u << 20;  // of each process
+  std::map<std::string, std::string> places;  // of its keys
 };
 
 }  // namespace mpf::crate

@@ -58,6 +58,7 @@ class CrateReader {
   CrateReader(Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
 
   void readRoot(TomlTable& table) {
+    crate_.places = table.places();
     table.read("name", crate_.name);
     table.read("backplane", crate_.backplane);
     table.read("location", crate_.location);
@@ -210,6 +211,7 @@ class CrateReader {
   }
 
   void readProcess(TomlTable& table, Entry entry, const std::string& defaultKind) {
+    const auto errorsBefore = errors_.lines().size();
     Process process;
     process.kind = defaultKind;
     readCommon(table, process);
@@ -220,6 +222,7 @@ class CrateReader {
       readSettings(table, *kind, process);
       table.finish();
       if (process.name.empty()) process.name = defaultName(process);
+      process.isSound = errors_.lines().size() == errorsBefore;
       crate_.processes.push_back(std::move(process));
     }
   }
@@ -261,11 +264,13 @@ class CrateReader {
   }
 
   void readCommand(TomlTable& table) {
+    const auto errorsBefore = errors_.lines().size();
     Process process;
     readCommon(table, process);
     table.read("command", process.command);
     table.read("notify", process.notifies);
     table.finish({R"(name = "viewer")", R"(command = ["viewer", "--all"])"});
+    process.isSound = errors_.lines().size() == errorsBefore;
     crate_.processes.push_back(std::move(process));
   }
 
@@ -287,15 +292,20 @@ milliseconds parseStallLimit(const std::string& text) {
 }
 
 Crate readCrate(const std::string& file) {
+  ConfigErrors errors;
+  auto crate = readCrate(file, errors);
+  errors.throwIfAny();
+  return crate;
+}
+
+Crate readCrate(const std::string& file, ConfigErrors& errors) {
   const auto root = parseTomlFile(file);
   Crate crate;
   crate.file = std::filesystem::absolute(file).lexically_normal().string();
   crate.name = std::filesystem::path(file).stem().string();
-  ConfigErrors errors;
   TomlTable table(root, file, "", errors);
   CrateReader(crate, errors).readRoot(table);
   checkCrate(crate, errors);
-  errors.throwIfAny();
   return crate;
 }
 

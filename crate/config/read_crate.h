@@ -13,10 +13,13 @@ namespace mpf::crate {
 
 //   throws  ConfigError with all errors, each with file, line and column
 [[nodiscard]] Crate readCrate(const std::string& file);
+// The same, but adds the errors to `errors`.
+//   throws  ConfigError when the file cannot be read or is not TOML
+[[nodiscard]] Crate readCrate(const std::string& file, ConfigErrors& errors);
 
 // Checks what concerns several entries: names that are used twice, needs that form a circle,
-// modules that two processes drive, unknown carriers, missing values.
-void checkCrate(const Crate& crate, ConfigErrors& errors);
+// modules that two processes drive, unknown carriers, missing values. Sets Process::isSound.
+void checkCrate(Crate& crate, ConfigErrors& errors);
 
 // Names of crates and processes are names of folders and files. Returns what is wrong with one;
 // empty: nothing.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/drivers/industry_pack/create_carrier.h>
 
+#include <algorithm>
 #include <array>
 #include <fmt/format.h>
 #include <stdexcept>
@@ -9,6 +10,7 @@
 #include <mpf/drivers/industry_pack/model_carrier.h>
 
 #include "drivers/industry_pack/carrier_parameters.h"
+#include "drivers/industry_pack/check_carrier.h"
 #include "drivers/industry_pack/tpci200.h"
 
 namespace mpf {
@@ -18,12 +20,23 @@ struct Kind {
   const char* name;
   const char* parameters;
   const char* what;
+  void (*check)(const std::string& parameters);
   std::unique_ptr<IndustryPackCarrier> (*create)(const std::string& parameters);
 };
 
-std::unique_ptr<IndustryPackCarrier> createModel(const std::string& parameters) {
+constexpr std::size_t kSites = 4;  // of each kind
+
+void checkModel(const std::string& parameters) {
   if (!parameters.empty()) throw std::invalid_argument("carrier kind \"model\" has no parameters");
-  return std::make_unique<ModelCarrier>();
+}
+
+std::unique_ptr<IndustryPackCarrier> createModel(const std::string& parameters) {
+  checkModel(parameters);
+  return std::make_unique<ModelCarrier>(kSites);
+}
+
+void checkTpci200(const std::string& parameters) {
+  static_cast<void>(Tpci200Options::parse(parameters));
 }
 
 std::unique_ptr<IndustryPackCarrier> createTpci200(const std::string& parameters) {
@@ -31,9 +44,11 @@ std::unique_ptr<IndustryPackCarrier> createTpci200(const std::string& parameters
 }
 
 constexpr std::array kKinds{
-    Kind{"model", "", "four sites with models of the modules that a program drives", createModel},
+    Kind{"model", "", "four sites with models of the modules that a program drives", checkModel,
+         createModel},
     Kind{"tpci200", "[ADDRESS|NUMBER][,poll=US]",
-         "TEWS TPCI200, a PCI board: at ADDRESS (lspci), or the NUMBERth from 0", createTpci200}};
+         "TEWS TPCI200, a PCI board: at ADDRESS (lspci), or the NUMBERth from 0", checkTpci200,
+         createTpci200}};
 
 // Checks the parameters nevertheless, so that an error in an old startup file is found on this
 // host.
@@ -48,16 +63,27 @@ constexpr std::array kKinds{
                   carrier.registers == BusSpace::isa ? "an ISA bus" : "a VME crate"));
 }
 
-}  // namespace
-
-std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind,
-                                                   const std::string& parameters) {
+const Kind& findKind(const std::string& kind, const std::string& parameters) {
   for (const auto& known : kKinds) {
-    if (known.name == kind) return known.create(parameters);
+    if (known.name == kind) return known;
   }
   if (isParameterKind(kind)) refuseOutOfReach(kind, parameters);
   throw std::invalid_argument(
       fmt::format("unknown carrier kind \"{}\"; the kinds are:\n{}", kind, carrierKinds()));
+}
+
+}  // namespace
+
+std::size_t checkCarrier(const std::string& text) {
+  const auto colon = std::min(text.find(':'), text.size());
+  const auto parameters = text.substr(std::min(colon + 1, text.size()));
+  findKind(text.substr(0, colon), parameters).check(parameters);
+  return kSites;
+}
+
+std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind,
+                                                   const std::string& parameters) {
+  return findKind(kind, parameters).create(parameters);
 }
 
 std::string carrierKinds() {

@@ -29,6 +29,7 @@ struct Options {
   std::vector<std::string> databases;
   std::string macros;
   bool noShell = false;
+  bool checkOnly = false;
 };
 
 // The dbd files are installed beside the program, and lie in the same place in a build folder.
@@ -86,12 +87,15 @@ int run(int argc, char** argv) {
   app.add_option("-m,--macros", options.macros, "Macros of the databases: \"P=lab:,N=1\"");
   app.add_flag("-S,--no-shell", options.noShell,
                "Do not read commands from standard input; run until SIGINT or SIGTERM");
+  app.add_flag("--check", options.checkOnly,
+               "Only check the arguments and load the databases; run no commands");
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
   std::optional<mpf::StopBell> stop;
   if (options.noShell) stop.emplace();
 
   registerCommands();
   load(options);
+  if (options.checkOnly) return 0;
   if (!options.startup.empty()) {
     check(iocsh(options.startup.c_str()),
           fmt::format("{}: a command failed: see the error above", options.startup));

@@ -30,6 +30,7 @@ int serve(int argc, char** argv, const EchoServer& echo) {
       ->check(wholeNumber(1, LinkGeometry::kMaxQueueSize));
   arguments.addTo(app);
   if (const auto status = parseCommandLine(app, argc, argv)) return *status;
+  if (arguments.checkOnly) return 0;
 
   const ServerLog log(echo.program, arguments.logLevel);
   MessageServer server(Backplane::attach(arguments.backplane), name, arguments.messages);

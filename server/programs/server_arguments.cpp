@@ -64,6 +64,8 @@ void ServerArguments::addTo(CLI::App& app) {
   app.add_option("--log-level", logLevel, "Lowest level of log lines on stderr")
       ->check(CLI::IsMember(ServerLog::levels()))
       ->capture_default_str();
+  app.add_flag("--check", checkOnly,
+               "Only check the arguments; opens no device. Exit status 2: one is wrong");
 }
 
 }  // namespace mpf

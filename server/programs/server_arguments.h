@@ -2,7 +2,7 @@
 // ServerArguments: the options that all server programs have.
 //
 //   --backplane NAME   --location N   --wait-mode spin|adaptive|block   --mode 0660   --group NAME
-//   --log-level info
+//   --log-level info   --check
 #pragma once
 
 #include <string>
@@ -19,6 +19,7 @@ struct ServerArguments {
   std::string backplane;
   std::string logLevel = "info";
   ServerOptions messages;
+  bool checkOnly = false;  // the program ends when all arguments are checked
 
   // Adds the options to `app`, which fills this object when it parses and must not outlive it. An
   // invalid value causes a CLI::ValidationError that names the valid values.

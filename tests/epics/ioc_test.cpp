@@ -52,6 +52,18 @@ TEST_F(IocProgram, LoadsADatabaseAndListsItsRecords) {
   EXPECT_THAT(result.output, HasSubstr("lab:v"));
 }
 
+TEST_F(IocProgram, ChecksItsDatabasesWithoutRunning) {
+  const TemporaryFolder folder;
+  const auto good = folder.write("a.db", "record(ai, \"v\") {}");
+  const auto wrong = folder.write("b.db", "record(nothing, \"v\") {}");
+  const auto check = std::string(MPF_TEST_IOC) + " -S --check -d ";
+
+  EXPECT_EQ(runCommand(check + good + " 2>&1").status, 0);
+  const auto result = runCommand(check + wrong + " 2>&1");
+  EXPECT_EQ(WEXITSTATUS(result.status), 1);
+  EXPECT_THAT(result.output, HasSubstr("cannot load the database " + wrong));
+}
+
 TEST_F(IocProgram, ReportsADatabaseThatItCannotLoad) {
   const TemporaryFolder folder;
   const auto database = folder.write("a.db", "record(nothing, \"v\") {}");

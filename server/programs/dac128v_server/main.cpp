@@ -59,6 +59,10 @@ int serve(int argc, char** argv) {
   Options options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
+  if (options.arguments.checkOnly) {
+    hardware.check(options.place);
+    return 0;
+  }
   const auto& arguments = options.arguments;
   const mpf::ServerLog log(kProgram, arguments.logLevel);
   auto* const module = hardware.open(

@@ -44,6 +44,10 @@ int serve(int argc, char** argv) {
   mpf::DigitalIoStartOptions options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
+  if (options.arguments.checkOnly) {
+    hardware.check(options.place);
+    return 0;
+  }
   const auto& arguments = options.arguments;
   const auto& name = options.place.name;
   const mpf::ServerLog log(kProgram, arguments.logLevel);

@@ -21,6 +21,10 @@ constexpr mpf::SniffBatching kSniffBatching{.maxBytes = 1 << 18};
 int serve(int argc, char** argv) {
   mpf::GpibStartOptions options;
   if (const auto exit = options.parse(argc, argv)) return *exit;
+  if (options.arguments.checkOnly) {
+    for (const auto& start : options.ti9914.modules) options.hardware.check(start.place);
+    return 0;
+  }
   const auto& arguments = options.arguments;
   const mpf::ServerLog log("mpf-gpib-server", arguments.logLevel);
   mpf::StopBell stop;  // before the controller, whose start may take seconds

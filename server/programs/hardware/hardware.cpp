@@ -13,6 +13,7 @@
 #include <mpf/drivers/industry_pack/model_carrier.h>
 
 #include "base/stop_bell.h"
+#include "drivers/industry_pack/check_carrier.h"
 
 namespace mpf {
 namespace {
@@ -107,6 +108,21 @@ IndustryPackModule& Hardware::openNow(const ModulePlace& place, const ModuleKind
   return module;
 }
 
+const std::string& Hardware::kindOf(const std::string& carrier) const {
+  const auto kind = kinds_.find(carrier);
+  if (kind == kinds_.end()) throw std::invalid_argument(unknownCarrier(carrier));
+  return kind->second;
+}
+
+void Hardware::check(const ModulePlace& place) const {
+  const auto sites = checkCarrier(kindOf(place.carrier));
+  for (std::size_t i = 0; i < sites; ++i)
+    if (siteName(i) == place.site) return;
+  throw std::invalid_argument(fmt::format(R"(site: carrier "{}" has no "{}"; it has {} to {})",
+                                          place.carrier, place.site, siteName(0),
+                                          siteName(sites - 1)));
+}
+
 void Hardware::logPriority(const ServerLog& log) const {
   if (priority_ == 0) {
     log->info("interrupts are served at ordinary priority (--real-time 0)");
@@ -123,9 +139,7 @@ void Hardware::logPriority(const ServerLog& log) const {
 void Hardware::createCarrierOf(const ModulePlace& place, const ServerLog& log) {
   const auto names = carriers_.names();
   if (std::find(names.begin(), names.end(), place.carrier) != names.end()) return;
-  const auto kind = kinds_.find(place.carrier);
-  if (kind == kinds_.end()) throw std::invalid_argument(unknownCarrier(place.carrier));
-  const auto& text = kind->second;
+  const auto& text = kindOf(place.carrier);
   const auto colon = text.find(':');
   carriers_.add(place.carrier,
                 createCarrier(text.substr(0, colon),

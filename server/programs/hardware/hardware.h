@@ -72,6 +72,10 @@ class Hardware {
                                          const MakeModel& makeModel, const ServerLog& log,
                                          StopBell& stop);
 
+  // Checks the carrier and the site of a module without opening a board.
+  //   throws  std::invalid_argument; IndustryPackError for a carrier that this host cannot reach
+  void check(const ModulePlace& place) const;
+
   // As open() without --wait.
   //   throws  also the errors that --wait would wait for
   [[nodiscard]] IndustryPackModule& openNow(const ModulePlace& place, const ModuleKind& kind,
@@ -92,6 +96,7 @@ class Hardware {
   [[nodiscard]] ModelWires* wires();
 
  private:
+  [[nodiscard]] const std::string& kindOf(const std::string& carrier) const;
   void createCarrierOf(const ModulePlace& place, const ServerLog& log);
   void plugModel(const ModulePlace& place, const MakeModel& makeModel);
 

@@ -78,10 +78,22 @@ void describe(const mpf::Ip330Servers& servers, mpf::Ip330& board,
             servers.names());
 }
 
+void check(const mpf::Ip330StartOptions& options, const mpf::Hardware& hardware) {
+  hardware.check(options.place);
+  for (const auto& dac : options.dacs) hardware.check(dac);
+  const auto makeNone = [](const std::string&) -> mpf::Ip330Signal { return {}; };
+  if (!options.signals.empty())
+    static_cast<void>(mpf::parseIp330Signals(options.signals, {{"wire", makeNone}}));
+}
+
 int serve(int argc, char** argv) {
   mpf::Ip330StartOptions options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
+  if (options.arguments.checkOnly) {
+    check(options, hardware);
+    return 0;
+  }
   const mpf::ServerLog log(kProgram, options.arguments.logLevel);
   auto* const module = hardware.open(
       options.place, mpf::kIp330, [&] { return makeAdc(options, hardware.wires()); }, log);

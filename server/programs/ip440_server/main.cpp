@@ -52,6 +52,10 @@ int serve(int argc, char** argv) {
   Options options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
+  if (options.arguments.checkOnly) {
+    hardware.check(options.place);
+    return 0;
+  }
   const mpf::ServerLog log(kProgram, options.arguments.logLevel);
   auto* const module = hardware.open(
       options.place, mpf::Ip440::kind(), [&] { return makeModel(options, hardware.wires()); }, log);

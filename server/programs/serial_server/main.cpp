@@ -21,6 +21,10 @@ namespace {
 int serve(int argc, char** argv) {
   mpf::SerialStartOptions options;
   if (const auto exit = options.parse(argc, argv)) return *exit;
+  if (options.arguments.checkOnly) {
+    for (const auto& uart : options.octal.uarts) options.hardware.check(uart.place);
+    return 0;
+  }
   const mpf::ServerLog log("mpf-serial-server", options.arguments.logLevel);
   mpf::SerialPorts ports(options, log);
   const auto backplane = mpf::Backplane::attach(options.arguments.backplane);

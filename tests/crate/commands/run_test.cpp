@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// mpf run and mpf new: names that cannot be names of folders and files.
+// mpf run and mpf new: names that cannot be names of folders and files; errors that are found
+// before anything is started.
 #include <sys/wait.h>
 
 #include <filesystem>
+#include <regex>
 
 #include "tests/crate/supervisor/supervisor_fixture.h"
 
@@ -10,6 +12,7 @@ namespace mpf::crate::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::StartsWith;
 
 class RunTest : public SupervisorTest {
  protected:
@@ -41,6 +44,125 @@ TEST_F(RunTest, ANewCrateHasANameThatItsCheckAccepts) {
   std::filesystem::create_directory(files_.path() / "folder");
   EXPECT_EQ(mpf("new crate folder/a").status, 0);
   EXPECT_EQ(mpf("run --check folder/a.toml").status, 0);
+}
+
+// ---- errors that this host, or a program, finds
+
+constexpr const char* kWrong = R"(backplane = "a b"
+mode = "0999"
+[carriers]
+ipac = "modle"
+[[server]]
+program = "int32"
+queue-size = 0
+wait-mode = "fast"
+[[server]]
+program = "char8-array"
+[[program]]
+name = "absent"
+command = "no-such-program 5"
+[[program]]
+name = "user"
+command = ["true"]
+user = "no-such-user"
+[[program]]
+name = "folder"
+command = ["true"]
+working-folder = "/no/such/folder"
+[[router]]
+file = "absent.toml"
+)";
+
+class RunCheckTest : public RunTest {
+ protected:
+  // The errors of a file, without its name.
+  std::string errorsOf(const std::string& text) {
+    static_cast<void>(files_.write("lab.toml", text));
+    const auto result = mpf("run --check lab.toml");
+    EXPECT_EQ(WEXITSTATUS(result.status), 2) << result.output;
+    return std::regex_replace(result.output, std::regex("(mpf run: )?lab.toml:"), "");
+  }
+};
+
+TEST_F(RunCheckTest, NamesUsersFoldersAndProgramsAreChecked) {
+  const auto errors = errorsOf(kWrong);
+
+  for (const std::string error :
+       {"1:13: backplane name \"a b\"", "4:8: unknown carrier kind \"modle\"",
+        "13:11: there is no program \"no-such-program 5\"; write command = [",
+        "17:8: user \"no-such-user\": this host has no such user",
+        "21:18: working-folder \"/no/such/folder\": this host has no such folder"})
+    EXPECT_THAT(errors, HasSubstr(error));
+}
+
+TEST_F(RunCheckTest, ProgramsCheckTheirArguments) {
+  const auto errors =
+      errorsOf(std::regex_replace(std::string(kWrong), std::regex("\"a b\""), "\"ab\""));
+
+  for (const std::string error :
+       {"7:14: queue-size: 0 is out of range", "8:13: wait-mode: fast not in",
+        "2:8: mode: 0999: use an octal number", "absent.toml: cannot be read"})
+    EXPECT_THAT(errors, HasSubstr(error));
+  EXPECT_EQ(errors.find("mode: 0999"), errors.rfind("mode: 0999"));  // of two servers
+}
+
+TEST_F(RunCheckTest, HardwareProgramsCheckTheirModules) {
+  const auto errors = errorsOf(R"(carriers = {ipac = "model"}
+[[server]]
+program = "dac128v"
+module = "dac"
+carrier = "ipac"
+site = "IP_x"
+[[server]]
+program = "ip330"
+module = "adc"
+carrier = "ipac"
+site = "IP_b"
+signal = "0=cosine:1"
+)");
+
+  EXPECT_THAT(errors, HasSubstr("6:8: site: carrier \"ipac\" has no \"IP_x\""));
+  EXPECT_THAT(errors, HasSubstr("12:10: signal \"0=cosine:1\""));
+}
+
+TEST_F(RunCheckTest, AFileWithOtherErrorsIsCheckedAsWell) {
+  const auto errors = errorsOf("colour = 1\n" + kServer + "queue-size = 0\n");
+
+  EXPECT_THAT(errors, HasSubstr("1:1: unknown key \"colour\""));
+  EXPECT_THAT(errors, HasSubstr("4:14: queue-size: 0 is out of range"));
+}
+
+TEST_F(RunCheckTest, EachErrorBeginsWithTheCommand) {
+  static_cast<void>(files_.write("lab.toml", "colour = 1\ncarriers = {ipac = \"modle\"}\n"));
+
+  EXPECT_THAT(mpf("run --check lab.toml").output,
+              testing::MatchesRegex("mpf run: lab.toml:1:1: unknown key .*\n"
+                                    "mpf run: .*lab.toml: the crate starts nothing.*\n"
+                                    "mpf run: lab.toml:2:.*unknown carrier kind .*\n  model .*"));
+  EXPECT_THAT(mpf("run absent.toml").output, StartsWith("mpf run: absent.toml: cannot be read"));
+  EXPECT_THAT(mpf("stop").output, StartsWith("mpf stop: no crate is running"));
+  EXPECT_THAT(mpf("run --help").output, HasSubstr("2 usage error, or errors in the crate file"));
+}
+
+TEST_F(RunCheckTest, ACrateWithSuchErrorsIsNotStarted) {
+  static_cast<void>(files_.write("lab.toml", kServer + "queue-size = 0\n"));
+
+  const auto result = mpf("run lab.toml");
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 2);
+  EXPECT_THAT(result.output, HasSubstr("queue-size: 0 is out of range"));
+}
+
+TEST_F(RunCheckTest, AReloadWithSuchErrorsChangesNothing) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto pid = pidOf("int32");
+  write(kServer + "queue-size = 0\n");
+
+  EXPECT_THAT([&] { ask({{"do", "reload"}}); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("queue-size: 0 is out of")));
+
+  EXPECT_EQ(pidOf("int32"), pid);
 }
 
 }  // namespace

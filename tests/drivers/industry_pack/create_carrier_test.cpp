@@ -7,6 +7,8 @@
 
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 
+#include "drivers/industry_pack/check_carrier.h"
+
 namespace mpf::test {
 namespace {
 
@@ -45,6 +47,15 @@ TEST(CreateCarrierTest, RefusesVmeAndIsaCarriersAndNamesTheAlternatives) {
   EXPECT_THAT(errorOfCreation("&vipc616_01", "0x3001"),
               HasSubstr("S_IPAC_badAddress: GreenSpring VIPC616-01 \"0x3001\""));
   EXPECT_THAT(errorOfCreation("atc40", ""), HasSubstr("an ISA bus"));
+}
+
+TEST(CheckCarrierTest, ChecksWithoutTheBoard) {
+  EXPECT_EQ(checkCarrier("model"), 4U);
+  EXPECT_EQ(checkCarrier("tpci200:0000:ff:1f.7"), 4U);
+  EXPECT_THROW(checkCarrier("model:4"), std::invalid_argument);
+  EXPECT_THROW(checkCarrier("tpci200:0,poll=0"), IndustryPackError);
+  EXPECT_THROW(checkCarrier("&vipc616_01:0x3000,0xa0000000"), IndustryPackError);
+  EXPECT_THROW(checkCarrier("modle"), std::invalid_argument);
 }
 
 TEST(CreateCarrierTest, RefusesAnUnknownKindAndListsTheKinds) {
