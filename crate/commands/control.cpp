@@ -3,6 +3,8 @@
 #include "crate/commands/control.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <memory>
@@ -10,6 +12,8 @@
 
 #include <mpf/clock.h>
 
+#include "base/print_error.h"
+#include "base/run_main.h"
 #include "crate/commands/commands.h"
 #include "crate/supervisor/control_protocol.h"
 #include "tools/arguments.h"
@@ -25,40 +29,83 @@ struct ControlArguments {
   Nanoseconds wait = std::chrono::seconds(30);
 };
 
+// The last process of this name: after a reload, those that are replaced come first until they have
+// ended.
 json processOf(const json& report, const std::string& name) {
+  auto found = json::object();
   for (const auto& one : report.at("processes"))
-    if (one.at("name") == name) return one;
-  return json::object();
+    if (one.at("name") == name) found = one;
+  return found;
 }
 
-// Waits until the process is in one of the states in which nothing more happens.
-int waitFor(const CrateFolder& folder, const ControlArguments& arguments, bool isStop,
-            int pidBefore) {
-  const auto deadline = Deadline::after(arguments.wait);
+// Waits until the process is in one of the states in which nothing more happens, and prints it.
+//   throws  std::runtime_error when it has failed, or is in another state at the deadline
+void waitFor(const CrateFolder& folder, const ControlArguments& arguments, const Deadline& deadline,
+             bool isStop, int pidBefore) {
   for (;;) {
     const auto process = processOf(askSupervisor(folder, {{"do", "ps"}}), arguments.process);
     const auto state = process.value("state", "gone");
     const auto isNew = process.value("pid", 0) != pidBefore;
     if (state == "stopped" || state == "gone" || (!isStop && state == "ready" && isNew)) {
       fmt::print("{} is {}\n", arguments.process, state);
-      return 0;
+      return;
     }
     if (state == "failed")
       throw std::runtime_error(fmt::format("{} has failed: {}; see `mpf logs {}`",
                                            arguments.process, process.value("reason", ""),
                                            arguments.process));
-    if (deadline.hasPassed())
-      throw std::runtime_error(fmt::format("{} is still {} after {}", arguments.process, state,
-                                           timeText(arguments.wait)));
+    if (deadline.hasPassed()) {
+      const auto reason = process.value("reason", "");
+      throw std::runtime_error(fmt::format("{} is still {} after {}{}{}", arguments.process, state,
+                                           timeText(arguments.wait), reason.empty() ? "" : ": ",
+                                           reason));
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }
 
+// Names the processes that run and need this one, which is stopped.
+void printDependants(const json& report, const std::string& name) {
+  std::vector<std::string> names;
+  for (const auto& one : report.at("processes")) {
+    const auto needs = one.value("needs", std::vector<std::string>());
+    if (one.at("pid") != 0 && std::ranges::find(needs, name) != needs.end())
+      names.push_back(one.at("name"));
+  }
+  if (!names.empty())
+    fmt::print("processes that need {} continue: {}\n", name, fmt::join(names, ", "));
+}
+
 int controlProcess(const std::string& what, const ControlArguments& arguments) {
   const auto folder = chooseCrate(arguments.crate);
-  const auto before = processOf(askSupervisor(folder, {{"do", "ps"}}), arguments.process);
-  askSupervisor(folder, {{"do", what}, {"name", arguments.process}});
-  return waitFor(folder, arguments, what == "stop", what == "restart" ? before.value("pid", 0) : 0);
+  const auto& name = arguments.process;
+  const auto before = processOf(askSupervisor(folder, {{"do", "ps"}}), name).value("pid", 0);
+  askSupervisor(folder, {{"do", what}, {"name", name}});
+  waitFor(folder, arguments, Deadline::after(arguments.wait), what == "stop",
+          what == "restart" ? before : 0);
+  if (what == "stop") printDependants(askSupervisor(folder, {{"do", "ps"}}), name);
+  return 0;
+}
+
+int reload(ControlArguments arguments) {
+  const auto folder = chooseCrate(arguments.crate);
+  const auto reply = askSupervisor(folder, {{"do", "reload"}});
+  const auto changed = reply.value("changed", std::vector<std::string>());
+  fmt::print("the crate \"{}\" is reloaded{}\n", folder.name(),
+             changed.empty() ? "; no process is started or restarted" : "");
+  std::fflush(stdout);
+  const auto deadline = Deadline::after(arguments.wait);
+  int status = 0;
+  for (const auto& name : changed) {
+    arguments.process = name;
+    try {
+      waitFor(folder, arguments, deadline, false, 0);
+    } catch (const std::runtime_error& error) {
+      printError("mpf reload: {}\n", error.what());
+      status = kExitFailed;
+    }
+  }
+  return status;
 }
 
 int stopCrate(const ControlArguments& arguments) {
@@ -77,6 +124,10 @@ int stopCrate(const ControlArguments& arguments) {
   return 0;
 }
 
+void addWait(CLI::App& command, ControlArguments& arguments) {
+  addTime(command, "--wait", arguments.wait, "Longest time to wait for the result");
+}
+
 void addRequest(CLI::App& app, Run& run, const std::string& what, const char* help) {
   auto& command = *app.add_subcommand(what, help);
   auto arguments = std::make_shared<ControlArguments>();
@@ -84,7 +135,7 @@ void addRequest(CLI::App& app, Run& run, const std::string& what, const char* he
   if (what == "stop") process->description("Name of the process; without it, the whole crate");
   else process->required();
   addCrateOption(command, arguments->crate);
-  addTime(command, "--wait", arguments->wait, "Longest time to wait for the result");
+  addWait(command, *arguments);
   command.callback([arguments, what, &run] {
     run = [arguments, what] {
       return arguments->process.empty() ? stopCrate(*arguments) : controlProcess(what, *arguments);
@@ -95,16 +146,10 @@ void addRequest(CLI::App& app, Run& run, const std::string& what, const char* he
 void addReload(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
       "reload", "Reads the crate file again; restarts only the processes that have changed");
-  auto crate = std::make_shared<std::string>();
-  addCrateOption(command, *crate);
-  command.callback([crate, &run] {
-    run = [crate] {
-      const auto folder = chooseCrate(*crate);
-      askSupervisor(folder, {{"do", "reload"}});
-      fmt::print("the crate \"{}\" is reloaded; `mpf ps` shows its processes\n", folder.name());
-      return 0;
-    };
-  });
+  auto arguments = std::make_shared<ControlArguments>();
+  addCrateOption(command, arguments->crate);
+  addWait(command, *arguments);
+  command.callback([arguments, &run] { run = [arguments] { return reload(*arguments); }; });
 }
 
 }  // namespace

@@ -33,14 +33,16 @@ void ServerWatch::look() {
   now_ = tools::Snapshot::take(backplane_);
 }
 
-bool ServerWatch::isServing(pid_t pid, std::int32_t location,
-                            const std::vector<std::string>& servers) const {
-  return now_ && std::ranges::all_of(servers, [&](const std::string& name) {
-           return std::ranges::any_of(now_->servers, [&](const WindowView& window) {
+std::vector<std::string> ServerWatch::notServing(pid_t pid, std::int32_t location,
+                                                 const std::vector<std::string>& servers) const {
+  auto missing = servers;
+  std::erase_if(missing, [&](const std::string& name) {
+    return now_ && std::ranges::any_of(now_->servers, [&](const WindowView& window) {
              return window.pid == pid && window.life == Life::alive && window.name == name &&
                     window.location == location;
            });
-         });
+  });
+  return missing;
 }
 
 bool ServerWatch::isStalled(pid_t pid) const {

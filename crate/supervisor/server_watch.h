@@ -24,9 +24,9 @@ class ServerWatch {
   // Reads the segments again. Stalls are found by comparison with the look before.
   void look();
 
-  // Whether the process `pid` serves all these names at this location.
-  [[nodiscard]] bool isServing(pid_t pid, std::int32_t location,
-                               const std::vector<std::string>& servers) const;
+  // Which of these names the process `pid` does not serve at this location.
+  [[nodiscard]] std::vector<std::string> notServing(pid_t pid, std::int32_t location,
+                                                    const std::vector<std::string>& servers) const;
   // Whether messages or clients wait for a server of the process, and it took none since the look
   // before.
   [[nodiscard]] bool isStalled(pid_t pid) const;

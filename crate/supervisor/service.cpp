@@ -56,6 +56,7 @@ void Service::started(pid_t pid, std::uint64_t startTicks, std::int64_t nowNs) {
   readyAtLatestNs_ = nowNs + nanoseconds(plan_.startTime);
   isRestartRequested_ = false;
   endReason_ = EndReason::none;
+  missing_.clear();
   stalledSinceNs_.reset();
 }
 
@@ -173,8 +174,9 @@ Action Service::action(bool areNeedsReady, std::int64_t nowNs) {
     case ServiceState::starting:
       if (nowNs >= readyAtLatestNs_) {
         terminate(EndReason::notReady,
-                  fmt::format("not ready within {}",
-                              durationText(static_cast<double>(nanoseconds(plan_.startTime)))),
+                  fmt::format("not ready within {}{}{}",
+                              durationText(static_cast<double>(nanoseconds(plan_.startTime))),
+                              missing_.empty() ? "" : ": ", missing_),
                   nowNs);
       }
       break;

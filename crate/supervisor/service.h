@@ -52,6 +52,8 @@ class Service {
   void adopted(pid_t pid, std::uint64_t startTicks, int restarts, std::int64_t nowNs,
                std::int64_t startedNs);
   void startFailed(const std::string& why, std::int64_t nowNs);
+  // While it is starting: what it lacks to be ready; empty: nothing.
+  void lacks(std::string missing) { missing_ = std::move(missing); }
   void becameReady(std::int64_t nowNs);
   void ended(const ProcessEnd& end, std::int64_t nowNs);
   // `isStalled`: messages wait for a server of the process, and it takes none.
@@ -82,6 +84,7 @@ class Service {
   [[nodiscard]] int restarts() const noexcept { return restarts_; }
   [[nodiscard]] std::int64_t startedNs() const noexcept { return startedNs_; }
   [[nodiscard]] bool isStalled() const noexcept { return stalledSinceNs_.has_value(); }
+  [[nodiscard]] const std::string& missing() const noexcept { return missing_; }
   // Why the supervisor ends the process that runs; none: it does not.
   [[nodiscard]] EndReason endReason() const noexcept { return endReason_; }
   // Why it is not running, or was last restarted: "SIGSEGV", "stalled for 10 s".
@@ -103,6 +106,7 @@ class Service {
   std::deque<std::int64_t> recentEndsNs_;  // within the restart window
   std::int64_t startedNs_ = 0;
   std::int64_t readyAtLatestNs_ = 0;  // while starting
+  std::string missing_;  // while starting
   std::int64_t nextStartNs_ = 0;  // while pausing
   std::int64_t killAtNs_ = 0;  // while stopping
   bool isSignalled_ = false;  // while stopping: SIGTERM was sent

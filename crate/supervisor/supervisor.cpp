@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <mpf/clock.h>
 
@@ -46,7 +47,7 @@ Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
   lock_ = folder_.lock();
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // reaps what the processes leave behind
   control_.listen(folder_);
-  apply(planProcesses(crate_, folder_.path().string()));
+  static_cast<void>(apply(planProcesses(crate_, folder_.path().string())));
   takeOver();
 }
 
@@ -94,30 +95,6 @@ void Supervisor::takeOver() {
     if (member->isRemoved || recorded.isStopRequested) service.requestStop(Clock::nowNs());
     else if (recorded.command != shellText(service.plan())) service.requestRestart(Clock::nowNs());
   }
-}
-
-// Takes these plans in place of the present ones. Processes whose plans are unchanged continue.
-void Supervisor::apply(const std::vector<ProcessPlan>& plans) {
-  for (const auto& plan : plans) {  // first what may fail: then nothing has changed
-    logs_.add(plan.name, folder_.log(plan.name));
-    watches_.try_emplace(plan.backplane, plan.backplane);
-  }
-  std::vector<std::unique_ptr<Member>> fresh;
-  for (const auto& plan : plans) {
-    const auto found = std::ranges::find_if(members_, [&](const auto& member) {
-      return member && member->service.plan() == plan && !member->isRemoved;
-    });
-    if (found != members_.end()) fresh.push_back(std::move(*found));
-    else fresh.push_back(std::make_unique<Member>(plan));
-  }
-  // The others end. Those that are replaced are first in the list, so that their successors wait.
-  for (auto& member : members_) {
-    if (!member) continue;
-    member->isRemoved = true;
-    member->service.requestStop(Clock::nowNs());
-    fresh.insert(fresh.begin(), std::move(member));
-  }
-  members_ = std::move(fresh);
 }
 
 void Supervisor::beginShutdown() {
@@ -287,7 +264,9 @@ void Supervisor::look() {
     const auto watch = watches_.find(service.plan().backplane);
     if (!service.isRunning() || watch == watches_.end()) continue;
     service.looked(watch->second.isStalled(service.pid()), now);
-    if (service.state() != ServiceState::starting || !isReady(*member)) continue;
+    if (service.state() != ServiceState::starting) continue;
+    service.lacks(whatIsMissing(*member));
+    if (!service.missing().empty()) continue;
     service.becameReady(now);
     log(service, fmt::format("ready, pid {}, {} after its start", service.pid(),
                              durationText(static_cast<double>(now - service.startedNs()))));
@@ -299,10 +278,14 @@ void Supervisor::look() {
   nextLookNs_ = Clock::nowNs() + pause.count();
 }
 
-bool Supervisor::isReady(const Member& member) const {
+std::string Supervisor::whatIsMissing(const Member& member) const {
   const auto& plan = member.service.plan();
-  return (member.isNotified || !plan.notifies) &&
-         watches_.at(plan.backplane).isServing(member.service.pid(), plan.location, plan.servers);
+  if (plan.notifies && !member.isNotified) return "it has not reported that it is ready";
+  const auto servers =
+      watches_.at(plan.backplane).notServing(member.service.pid(), plan.location, plan.servers);
+  if (servers.empty()) return {};
+  return fmt::format("clients cannot bind to {} at location {}", fmt::join(servers, ", "),
+                     plan.location);
 }
 
 void Supervisor::takeReports() {

@@ -57,8 +57,8 @@ class Supervisor {
   };
 
   void takeOver();
-  void apply(const std::vector<ProcessPlan>& plans);
-  void reload();
+  std::vector<std::string> apply(const std::vector<ProcessPlan>& plans);
+  std::vector<std::string> reload();
   void beginShutdown();
   void act();
   void start(Member& member);
@@ -68,7 +68,8 @@ class Supervisor {
   void handleEnd(Member& member, const ProcessEnd& end);
   void lookForEnds();
   void look();
-  [[nodiscard]] bool isReady(const Member& member) const;
+  // Why a process that runs is not ready; empty: it is.
+  [[nodiscard]] std::string whatIsMissing(const Member& member) const;
   void takeReports();
   void record() const;
   void tryRecord();  // again at the next look, if it fails

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Supervisor: the requests of mpf ps, mpf stop and the other commands.
+// Supervisor: the requests of mpf ps, mpf stop and the other commands; reloads.
 #include <unistd.h>
 
+#include <algorithm>
 #include <fmt/format.h>
 #include <stdexcept>
 
@@ -18,25 +19,59 @@ nlohmann::json Supervisor::answer(const nlohmann::json& request) {
   const std::string what = request.at("do");
   const auto now = Clock::nowNs();
   if (what == "ps") return describe();
-  if (what == "reload") reload();
+  auto reply = nlohmann::json::object();
+  if (what == "reload") reply["changed"] = reload();
   else if (what == "shutdown") beginShutdown();
   else if (what == "stop") memberOf(request).service.requestStop(now);
   else if (what == "start") memberOf(request).service.requestStart();
   else if (what == "restart") memberOf(request).service.requestRestart(now);
   else throw std::runtime_error(fmt::format("unknown request \"{}\"", what));
   tryRecord();
-  return nlohmann::json::object();
+  return reply;
 }
 
-void Supervisor::reload() try {
+// Takes these plans in place of the present ones. Processes whose plans are unchanged continue.
+// Returns the names of the others.
+std::vector<std::string> Supervisor::apply(const std::vector<ProcessPlan>& plans) {
+  for (const auto& plan : plans) {  // first what may fail: then nothing has changed
+    logs_.add(plan.name, folder_.log(plan.name));
+    watches_.try_emplace(plan.backplane, plan.backplane);
+  }
+  std::vector<std::unique_ptr<Member>> fresh;
+  std::vector<std::string> changed;
+  for (const auto& plan : plans) {
+    const auto found = std::ranges::find_if(members_, [&](const auto& member) {
+      return member && member->service.plan() == plan && !member->isRemoved;
+    });
+    if (found != members_.end()) {
+      fresh.push_back(std::move(*found));
+    } else {
+      fresh.push_back(std::make_unique<Member>(plan));
+      changed.push_back(plan.name);
+    }
+  }
+  // The others end. Those that are replaced are first in the list, so that their successors wait.
+  for (auto& member : members_) {
+    if (!member) continue;
+    member->isRemoved = true;
+    member->service.requestStop(Clock::nowNs());
+    fresh.insert(fresh.begin(), std::move(member));
+  }
+  members_ = std::move(fresh);
+  return changed;
+}
+
+// Returns the names of the processes that it starts or restarts.
+std::vector<std::string> Supervisor::reload() try {
   ServiceManager::notifyReloading();
   auto fresh = load_();
-  apply(planProcesses(fresh, folder_.path().string()));
+  auto changed = apply(planProcesses(fresh, folder_.path().string()));
   crate_ = std::move(fresh);
   logs_.setMaxBytes(crate_.maxLogBytes);
   capsuleWriter_.setLimits(crate_);
   printError("mpf run: reloaded {}\n", crate_.file);
   ServiceManager::notifyReady();
+  return changed;
 } catch (...) {
   ServiceManager::notifyReady();
   throw;

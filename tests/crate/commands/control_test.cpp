@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf stop, mpf start, mpf restart: their options, and names that no process has.
+// mpf stop, mpf start, mpf restart, mpf reload: their options, names that no process has, and what
+// they report.
 #include <sys/wait.h>
 
 #include "tests/crate/supervisor/supervisor_fixture.h"
@@ -28,6 +29,56 @@ TEST_F(ControlTest, ANameThatIsNotUtf8IsUnknown) {
 
   EXPECT_EQ(WEXITSTATUS(result.status), 1);
   EXPECT_THAT(result.output, HasSubstr("the crate has no process"));
+}
+
+TEST_F(ControlTest, AReloadReturnsWhenTheProcessesAreReady) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto pid = pidOf("int32");
+
+  EXPECT_THAT(runCommand(MPF " reload --wait 900").output,
+              HasSubstr("no process is started or restarted"));
+  write(kServer + "queue-size = 7\n");
+  const auto result = runCommand(MPF " reload --wait 900");
+
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.output, HasSubstr("int32 is ready"));
+  EXPECT_EQ(stateOf("int32"), "ready");
+  EXPECT_NE(pidOf("int32"), pid);
+}
+
+TEST_F(ControlTest, AReloadSaysWhichProcessFails) {
+  run(kServer);
+  write(kServer + "[[program]]\nname = \"wrong\"\ncommand = [\"sh\", \"-c\", \"exit 2\"]\n");
+
+  const auto result = runCommand(MPF " reload --wait 900 2>&1");
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 1);
+  EXPECT_THAT(result.output, HasSubstr("mpf reload: wrong has failed: exit status 2"));
+}
+
+TEST_F(ControlTest, AStopNamesTheProcessesThatContinue) {
+  run(kServer +
+      "[[program]]\nname = \"user\"\ncommand = [\"sleep\", \"1000\"]\n"
+      "needs = [\"int32\"]\n");
+  waitForState("user", "ready");
+
+  const auto result = runCommand(MPF " stop int32 --wait 900");
+
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.output, HasSubstr("processes that need int32 continue: user"));
+  EXPECT_EQ(stateOf("user"), "ready");
+}
+
+TEST_F(ControlTest, AProcessThatIsNotReadySaysWhatIsMissing) {
+  run("[[program]]\nname = \"mute\"\ncommand = [\"sleep\", \"1000\"]\nservers = [\"never\"]\n"
+      "start-time = \"1ms\"\n");
+
+  while (process("mute")
+             .value("reason", "")
+             .find("not ready within 1000.0 us: clients cannot bind "
+                   "to never at location 0") == std::string::npos)
+    continue;
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include <unistd.h>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <mpf/message_client.h>
 #include <mpf/message_server.h>
@@ -17,6 +17,8 @@ namespace mpf::crate::test {
 namespace {
 
 using mpf::test::Program;
+using testing::ElementsAre;
+using testing::IsEmpty;
 
 // A server of this process, which accepts clients and takes requests only when the test says so.
 class ServerWatchTest : public testing::Test {
@@ -47,15 +49,15 @@ class ServerWatchTest : public testing::Test {
 };
 
 TEST_F(ServerWatchTest, SeesTheServersOfAProcess) {
-  EXPECT_FALSE(watch_.isServing(::getpid(), 0, {"one"})) << "before the first look";
+  EXPECT_THAT(watch_.notServing(::getpid(), 0, {"one"}), ElementsAre("one")) << "before a look";
 
   watch_.look();
 
-  EXPECT_TRUE(watch_.isServing(::getpid(), 0, {"one"}));
-  EXPECT_TRUE(watch_.isServing(::getpid(), 0, {}));
-  EXPECT_FALSE(watch_.isServing(::getpid(), 0, {"one", "two"}));
-  EXPECT_FALSE(watch_.isServing(::getpid(), 1, {"one"}));
-  EXPECT_FALSE(watch_.isServing(::getppid(), 0, {"one"}));
+  EXPECT_THAT(watch_.notServing(::getpid(), 0, {"one"}), IsEmpty());
+  EXPECT_THAT(watch_.notServing(::getpid(), 0, {}), IsEmpty());
+  EXPECT_THAT(watch_.notServing(::getpid(), 0, {"one", "two"}), ElementsAre("two"));
+  EXPECT_THAT(watch_.notServing(::getpid(), 1, {"one"}), ElementsAre("one"));
+  EXPECT_THAT(watch_.notServing(::getppid(), 0, {"one"}), ElementsAre("one"));
 }
 
 TEST_F(ServerWatchTest, AnIdleServerIsNotStalled) {
@@ -106,7 +108,8 @@ TEST_F(ServerWatchTest, RemovesTheFilesOfDeadProcesses) {
 
   EXPECT_LT(backplane_.segmentNames().size(), files);
   watch_.look();
-  EXPECT_TRUE(watch_.isServing(::getpid(), 0, {"one"})) << "of those that live, nothing is removed";
+  EXPECT_THAT(watch_.notServing(::getpid(), 0, {"one"}), IsEmpty())
+      << "of those that live, nothing is removed";
 }
 
 }  // namespace
