@@ -194,13 +194,18 @@ void TomlTable::readNamed(const char* key,
   for (const auto& [name, value] : *node->as_table()) use(std::string(name.str()), value);
 }
 
-void TomlTable::finish(const std::vector<std::string>& required) const {
+void TomlTable::finish(const std::vector<std::string>& required,
+                       const std::function<std::string(const std::string& key)>& placeOfKey) const {
   const auto prefix = header_.empty() ? "" : header_ + ": ";
-  for (const auto& [key, node] : *table_) {
-    if (std::ranges::find(known_, key.str()) == known_.end()) {
-      errors_->add(placeOf(key.source()), fmt::format("{}unknown key \"{}\"; {}", prefix, key.str(),
-                                                      suggestion(key.str(), known_, "keys")));
-    }
+  for (const auto& [tomlKey, node] : *table_) {
+    const std::string key(tomlKey.str());
+    if (std::ranges::find(known_, key) != known_.end()) continue;
+    const auto isNear = [&](const std::string& known) { return distanceOf(known, key) <= 1; };
+    const auto place = placeOfKey && std::ranges::none_of(known_, isNear) ? placeOfKey(key) : "";
+    errors_->add(placeOf(tomlKey.source()),
+                 fmt::format("{}unknown key \"{}\"; {}", prefix, key,
+                             place.empty() ? suggestion(key, known_, "keys")
+                                           : fmt::format("it belongs to {}", place)));
   }
   for (const auto& example : required) {
     const auto key = example.substr(0, example.find(' '));

@@ -56,9 +56,11 @@ class TomlTable {
   void readNamed(const char* key,
                  const std::function<void(const std::string&, const toml::node&)>& use);
 
-  // Refuses keys that were not read, and then the absence of a required key. `required` has an
-  // example for each required key: "location = 1".
-  void finish(const std::vector<std::string>& required = {}) const;
+  // Refuses keys that were not read, and then the absence of a required key.
+  //   required    an example for each required key: "location = 1"
+  //   placeOfKey  says to which other table of the file a key belongs: "[tls]"; empty: to none
+  void finish(const std::vector<std::string>& required = {},
+              const std::function<std::string(const std::string& key)>& placeOfKey = {}) const;
 
   // Adds an error at the value of a key.
   void refuse(const toml::node& node, const std::string& text) const;

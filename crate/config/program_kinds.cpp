@@ -2,6 +2,8 @@
 #include "crate/config/program_kinds.h"
 
 #include <algorithm>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace mpf::crate {
 namespace {
@@ -160,6 +162,19 @@ const std::vector<ProgramKind>& programKinds() {
 const ProgramKind* findKind(std::string_view name) {
   const auto found = std::ranges::find(programKinds(), name, &ProgramKind::name);
   return found != programKinds().end() ? &*found : nullptr;
+}
+
+std::string tablesWith(const std::string& key) {
+  std::vector<std::string> tables;
+  std::vector<std::string> servers;
+  for (const auto& kind : programKinds()) {
+    if (const auto keys = kind.keys(); std::ranges::find(keys, key) == keys.end()) continue;
+    if (kind.entry == Entry::server) servers.push_back(kind.name);
+    else tables.push_back(fmt::format("[[{}]]", kind.name));
+  }
+  if (!servers.empty())
+    tables.push_back(fmt::format("[[server]] of program \"{}\"", fmt::join(servers, "\", \"")));
+  return fmt::to_string(fmt::join(tables, " or "));
 }
 
 const std::vector<std::string>& commonKeys() {

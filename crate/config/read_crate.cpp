@@ -53,6 +53,41 @@ std::uint64_t parseSize(const std::string& text) {
   return static_cast<std::uint64_t>(parseCount(text.substr(0, unitAt))) << shift;
 }
 
+// The table to which a key belongs that another table has; empty: no table has it.
+std::string placeOfKey(const std::string& key) {
+  constexpr const char* kSupervision = "[supervision], or to a process such as [[server]]";
+  constexpr const char* kProcess = "a process, such as [[server]]";
+  constexpr const char* kTop = "the top of the file";
+  constexpr const char* kBoth = "the top of the file, or to a process such as [[server]]";
+  static const std::map<std::string, const char*> places{{"restart", kSupervision},
+                                                         {"start-time", kSupervision},
+                                                         {"stop-time", kSupervision},
+                                                         {"stall-limit", kSupervision},
+                                                         {"first-pause", kSupervision},
+                                                         {"last-pause", kSupervision},
+                                                         {"max-restarts", kSupervision},
+                                                         {"restart-window", kSupervision},
+                                                         {"needs", kProcess},
+                                                         {"servers", kProcess},
+                                                         {"working-folder", kProcess},
+                                                         {"arguments", kProcess},
+                                                         {"program", "[[server]]"},
+                                                         {"command", "[[program]]"},
+                                                         {"notify", "[[program]]"},
+                                                         {"count", "[capsules]"},
+                                                         {"size", "[logs] or [capsules]"},
+                                                         {"backplane", kTop},
+                                                         {"carriers", kTop},
+                                                         {"supervision", kTop},
+                                                         {"capsules", kTop},
+                                                         {"logs", kTop},
+                                                         {"user", kBoth},
+                                                         {"location", kBoth},
+                                                         {"environment", kBoth}};
+  const auto place = places.find(key);
+  return place != places.end() ? place->second : tablesWith(key);
+}
+
 class CrateReader {
  public:
   CrateReader(Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
@@ -67,18 +102,18 @@ class CrateReader {
     readEnvironment(table, crate_.environment);
     table.readTable("supervision", [&](TomlTable& limits) {
       readSupervision(limits, crate_.supervision);
-      limits.finish();
+      limits.finish({}, placeOfKey);
     });
     table.readTable("capsules", [&](TomlTable& capsules) {
       capsules.readWith("count",
                         [&](const std::string& text) { crate_.maxCapsules = parseCount(text); });
       capsules.readWith("size",
                         [&](const std::string& text) { crate_.maxCapsuleBytes = parseSize(text); });
-      capsules.finish();
+      capsules.finish({}, placeOfKey);
     });
     table.readTable("logs", [&](TomlTable& logs) {
       logs.readWith("size", [&](const std::string& text) { crate_.maxLogBytes = parseSize(text); });
-      logs.finish();
+      logs.finish({}, placeOfKey);
     });
     table.readNamed("carriers", [&](const std::string& name, const toml::node& node) {
       if (const auto kind = node.value_exact<std::string>())
@@ -92,7 +127,7 @@ class CrateReader {
                      [&](TomlTable& entry) { readProcess(entry, Entry::router, "router"); });
     table.readTables("ioc", [&](TomlTable& entry) { readProcess(entry, Entry::ioc, "ioc"); });
     table.readTables("program", [&](TomlTable& entry) { readCommand(entry); });
-    table.finish();
+    table.finish({}, placeOfKey);
   }
 
  private:
@@ -220,7 +255,7 @@ class CrateReader {
     if (entry == Entry::server) table.read("program", process.kind);
     if (const auto* const kind = checkedKind(process, entry)) {
       readSettings(table, *kind, process);
-      table.finish();
+      table.finish({}, placeOfKey);
       if (process.name.empty()) process.name = defaultName(process);
       process.isSound = errors_.lines().size() == errorsBefore;
       crate_.processes.push_back(std::move(process));
@@ -269,7 +304,7 @@ class CrateReader {
     readCommon(table, process);
     table.read("command", process.command);
     table.read("notify", process.notifies);
-    table.finish({R"(name = "viewer")", R"(command = ["viewer", "--all"])"});
+    table.finish({R"(name = "viewer")", R"(command = ["viewer", "--all"])"}, placeOfKey);
     process.isSound = errors_.lines().size() == errorsBefore;
     crate_.processes.push_back(std::move(process));
   }

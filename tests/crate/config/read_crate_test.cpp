@@ -199,6 +199,22 @@ TEST_F(ReadCrateTest, OnlyTheStallLimitCanBeOff) {
                                 "1min\n"));
 }
 
+TEST_F(ReadCrateTest, AKeyOfAnotherTableIsNamedWithItsTable) {
+  const std::string server = "[[server]]\nprogram = \"int32\"\n";
+
+  EXPECT_THAT(
+      errorsOf("stall-limit = \"2s\"\n" + server),
+      HasSubstr("unknown key \"stall-limit\"; it belongs to [supervision], or to a process"));
+  EXPECT_THAT(errorsOf("needs = [\"a\"]\n" + server), HasSubstr("it belongs to a process"));
+  EXPECT_THAT(errorsOf(server + "baud = 9600\n"),
+              HasSubstr("unknown key \"baud\"; it belongs to [[server]] of program \"serial\""));
+  EXPECT_THAT(errorsOf(server + "backplane = \"b\"\n"),
+              HasSubstr("it belongs to the top of the file"));
+  EXPECT_THAT(errorsOf("[supervision]\nlisten = \"*:1\"\n" + server),
+              HasSubstr("it belongs to [[router]]"));
+  EXPECT_THAT(errorsOf(server + "queuesize = 7\n"), HasSubstr("did you mean \"queue-size\"?"));
+}
+
 }  // namespace
 }  // namespace mpf::crate::test
 // NOLINTEND(modernize-raw-string-literal)
