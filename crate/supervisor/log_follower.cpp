@@ -36,6 +36,7 @@ std::string LineFolder::fold(const std::string& line) {
   auto bare = withoutNumbers(line);
   if (bare == last_ && ++printed_ > kMostPrinted) {
     ++folded_;
+    if (lines_.size() <= countText().size()) lines_ += line + "\n";
     return {};
   }
   auto text = finish();
@@ -46,9 +47,14 @@ std::string LineFolder::fold(const std::string& line) {
 
 std::string LineFolder::finish() {
   if (folded_ == 0) return {};
-  auto text = fmt::format("(previous line repeated {} times)\n", folded_);
+  const auto count = countText();
   folded_ = 0;
-  return text;
+  auto lines = std::exchange(lines_, {});
+  return lines.size() <= count.size() ? lines : count;
+}
+
+std::string LineFolder::countText() const {
+  return folded_ == 1 ? "(repeated once more)\n" : fmt::format("(repeated {} times)\n", folded_);
 }
 
 LogFollower::LogFollower(bool hasColour, std::uint64_t maxBytes)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // LogFollower: copies the lines that processes append to their logs to the stderr of the
-// supervisor, each with the name of its process, and limits the size of the logs. A line that
-// repeats more than three times is counted instead of copied.
+// supervisor, each with the name of its process, and limits the size of the logs. Of lines that
+// repeat, the first three are copied, and the others are counted if the count is shorter than they.
 //
 //   NAME.log ─ pread ─► "NAME | line"
 //
@@ -27,14 +27,17 @@ class LineFolder {
   // The text to print for a line: nothing if it repeats the lines before; a count of such lines
   // before a line that differs. Digits, as in times, do not count as differences.
   [[nodiscard]] std::string fold(const std::string& line);
-  // The count that was not printed yet.
+  // What was not printed yet: the count of the repeated lines, or the lines if they are not longer.
   [[nodiscard]] std::string finish();
 
  private:
+  [[nodiscard]] std::string countText() const;
+
   static constexpr int kMostPrinted = 3;
   std::string last_;  // without its digits
   int printed_ = 0;  // how often the last line came
   std::uint64_t folded_ = 0;
+  std::string lines_;  // the folded ones, until they are longer than a count
 };
 
 class LogFollower {

@@ -26,8 +26,21 @@ TEST(LineFolder, CountsLinesThatRepeat) {
 
   EXPECT_EQ(text,
             "12:00:00 full\n12:00:01 full\n12:00:02 full\n"
-            "(previous line repeated 7 times)\nempty\n");
+            "(repeated 7 times)\nempty\n");
   EXPECT_EQ(folder.finish(), "");
+}
+
+TEST(LineFolder, PrintsLinesThatAreNotLongerThanTheirCount) {
+  LineFolder folder;
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(folder.fold("tick"), "tick\n");
+
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(folder.fold("tick"), "");
+    EXPECT_EQ(folder.finish(), "tick\n") << "once a second";
+  }
+  const std::string line(100, 'a');
+  for (int i = 0; i < 4; ++i) static_cast<void>(folder.fold(line));
+  EXPECT_EQ(folder.finish(), "(repeated once more)\n");
 }
 
 class LogFollowerTest : public testing::Test {
