@@ -30,7 +30,7 @@ int showCapsule(const CapsuleArguments& arguments) {
 
 int listCapsules(const CapsuleArguments& arguments) {
   const auto folder =
-      arguments.folder.empty() ? chooseCrate(arguments.crate).file("capsules") : arguments.folder;
+      arguments.folder.empty() ? chooseFiles(arguments.crate).file("capsules") : arguments.folder;
   auto all = nlohmann::ordered_json::array();
   std::string lines;
   for (const auto& path : CapsuleStore(folder).list()) {

@@ -16,6 +16,7 @@
 #include "base/run_main.h"
 #include "crate/commands/commands.h"
 #include "crate/supervisor/control_protocol.h"
+#include "crate/supervisor/crate_state.h"
 #include "tools/arguments.h"
 
 namespace mpf::crate {
@@ -124,6 +125,17 @@ int stopCrate(const ControlArguments& arguments) {
   return 0;
 }
 
+std::vector<CrateFolder> lockedOf(std::vector<CrateFolder> folders) {
+  std::erase_if(folders, [](const auto& folder) { return !folder.isLocked(); });
+  return folders;
+}
+
+std::string namesOf(const std::vector<CrateFolder>& folders) {
+  std::vector<std::string> names;
+  for (const auto& folder : folders) names.push_back(folder.name());
+  return fmt::to_string(fmt::join(names, ", "));
+}
+
 void addWait(CLI::App& command, ControlArguments& arguments) {
   addTime(command, "--wait", arguments.wait, "Longest time to wait for the result");
 }
@@ -158,22 +170,51 @@ void addCrateOption(CLI::App& command, std::string& crate) {
   command.add_option("--crate", crate, "Name of the crate; default: the one that runs");
 }
 
+std::string textOfUnsupervised(const CrateFolder& folder) {
+  if (folder.isLocked()) return {};
+  const auto state = CrateState::read(folder.file("state.json"));
+  const auto running = state.running();
+  if (running.empty()) return {};
+  return fmt::format(
+      "the supervisor of the crate \"{}\" has ended; {} of its processes {}: `mpf run {}` takes "
+      "{} over",
+      folder.name(), running.size(), running.size() == 1 ? "runs" : "run", state.file,
+      running.size() == 1 ? "it" : "them");
+}
+
 CrateFolder chooseCrate(const std::string& name) {
-  if (!name.empty()) return CrateFolder::of(name);
-  std::vector<CrateFolder> running;
-  std::vector<std::string> names;
-  for (const auto& folder : CrateFolder::all()) {
-    if (!folder.isLocked()) continue;
-    running.push_back(folder);
-    names.push_back(folder.name());
-  }
+  const auto all = name.empty() ? CrateFolder::all() : std::vector{CrateFolder::of(name)};
+  const auto running = lockedOf(all);
   if (running.size() == 1) return running.front();
-  if (running.empty())
+  if (running.size() > 1)
+    throw std::runtime_error(fmt::format("{} crates are running; choose one with --crate: {}",
+                                         running.size(), namesOf(running)));
+  for (const auto& folder : all)
+    if (const auto text = textOfUnsupervised(folder); !text.empty())
+      throw std::runtime_error(text + "; then use this command again");
+  if (!name.empty()) return all.front();  // its request says that it is not running
+  throw std::runtime_error(fmt::format("no crate is running (in {}); start one with `mpf run FILE`",
+                                       CrateFolder::parent().string()));
+}
+
+CrateFolder chooseFiles(const std::string& name) {
+  const auto all = CrateFolder::all();
+  if (!name.empty()) {
+    const auto found = std::ranges::find(all, name, &CrateFolder::name);
+    if (found != all.end()) return *found;
+    throw std::runtime_error(fmt::format("there are no files of a crate \"{}\" in {}; there are {}",
+                                         name, CrateFolder::parent().string(),
+                                         all.empty() ? "none" : namesOf(all)));
+  }
+  const auto running = lockedOf(all);
+  const auto& folders = running.empty() ? all : running;
+  if (folders.size() == 1) return folders.front();
+  if (folders.empty())
     throw std::runtime_error(
-        fmt::format("no crate is running (in {}); start one with `mpf run FILE`",
-                    CrateFolder::parent().string()));
-  throw std::runtime_error(fmt::format("{} crates are running; choose one with --crate: {}",
-                                       running.size(), fmt::join(names, ", ")));
+        fmt::format("there are no files of a crate in {}", CrateFolder::parent().string()));
+  throw std::runtime_error(fmt::format(
+      "{} crates {}; choose one with --crate NAME: {}", folders.size(),
+      running.empty() ? "have files, and none is running" : "are running", namesOf(folders)));
 }
 
 void addControl(CLI::App& app, Run& run) {

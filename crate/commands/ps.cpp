@@ -14,6 +14,8 @@
 #include <memory>
 #include <optional>
 
+#include <mpf/clock.h>
+
 #include "base/command_line.h"
 #include "base/duration_text.h"
 #include "base/print_error.h"
@@ -24,7 +26,9 @@
 #include "base/whole_file.h"
 #include "crate/commands/commands.h"
 #include "crate/commands/control.h"
+#include "crate/supervisor/child_process.h"
 #include "crate/supervisor/control_protocol.h"
+#include "crate/supervisor/crate_state.h"
 #include "crate/supervisor/log_follower.h"
 #include "tools/text/json_text.h"
 #include "tools/text/table.h"
@@ -53,8 +57,11 @@ std::string stateOf(const json& process) {
 }
 
 void printCrate(const json& crate) {
-  fmt::print("crate {}, {}, supervisor {}\n", crate.at("crate").get<std::string>(),
-             crate.at("file").get<std::string>(), crate.at("pid").get<int>());
+  const auto supervisor = crate.at("pid").get<int>();
+  fmt::print("crate {}, {}, {}\n", crate.at("crate").get<std::string>(),
+             crate.at("file").get<std::string>(),
+             supervisor != 0 ? fmt::format("supervisor {}", supervisor)
+                             : crate.at("problem").get<std::string>());
   Table table({"PROCESS", "STATE", ">PID", ">RESTARTS", ">UP", ">CPU", ">MEMORY", "LAST END"});
   for (const auto& process : crate.at("processes")) {
     const auto pid = process.at("pid").get<int>();
@@ -70,10 +77,35 @@ void printCrate(const json& crate) {
   fmt::print("{}", table.fitted("  "));
 }
 
+// The processes of a crate whose supervisor has ended; nothing: none runs.
+std::optional<json> tryUnsupervised(const CrateFolder& folder) {
+  const auto problem = textOfUnsupervised(folder);
+  if (problem.empty()) return std::nullopt;
+  const auto state = CrateState::read(folder.file("state.json"));
+  auto processes = json::array();
+  for (const auto& process : state.running()) {
+    const auto upNs = Clock::nowNs() - startNsOf(process.startTicks);
+    processes.push_back({{"name", process.name},
+                         {"state", "unsupervised"},
+                         {"pid", process.pid},
+                         {"restarts", process.restarts},
+                         {"upS", static_cast<double>(upNs) / 1e9},
+                         {"reason", ""},
+                         {"log", folder.log(process.name)}});
+  }
+  return json{{"crate", folder.name()},
+              {"file", state.file},
+              {"folder", folder.path().string()},
+              {"pid", 0},
+              {"problem", problem},
+              {"processes", processes}};
+}
+
 // Returns the report of a crate. A supervisor that does not reply must not hide the other crates:
 // then prints why, and returns nothing.
 std::optional<json> tryReport(const CrateFolder& folder) try {
-  auto crate = askSupervisor(folder, {{"do", "ps"}});
+  auto crate = tryUnsupervised(folder).value_or(json());
+  if (crate.is_null()) crate = askSupervisor(folder, {{"do", "ps"}});
   for (auto& process : crate.at("processes")) addUse(process);
   return crate;
 } catch (const std::exception& error) {
@@ -84,7 +116,9 @@ std::optional<json> tryReport(const CrateFolder& folder) try {
 std::vector<CrateFolder> chosenFolders(const std::string& name) {
   if (!name.empty()) return {CrateFolder::of(name)};
   auto folders = CrateFolder::all();
-  std::erase_if(folders, [](const auto& folder) { return !folder.isLocked(); });
+  std::erase_if(folders, [](const auto& folder) {
+    return !folder.isLocked() && textOfUnsupervised(folder).empty();
+  });
   return folders;
 }
 
@@ -153,7 +187,7 @@ std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
 }
 
 int showLog(const LogArguments& arguments) try {
-  const auto path = chooseCrate(arguments.crate).log(arguments.process);
+  const auto path = chooseFiles(arguments.crate).log(arguments.process);
   const auto text = readWholeFile(path);
   if (!text.empty()) fmt::print("{}", printableLines(lastLines(text, arguments.lines)));
   if (arguments.follow) follow(path, static_cast<std::int64_t>(text.size()));
@@ -161,7 +195,8 @@ int showLog(const LogArguments& arguments) try {
 } catch (const std::system_error& error) {
   if (error.code().value() != ENOENT) throw;
   throw std::runtime_error(
-      fmt::format("there is no log of \"{}\"; `mpf ps` shows the processes", arguments.process));
+      fmt::format("there is no log of \"{}\" in {}; `mpf ps` shows the processes that run",
+                  arguments.process, chooseFiles(arguments.crate).path().string()));
 }
 
 }  // namespace

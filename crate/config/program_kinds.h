@@ -41,7 +41,7 @@ struct ProgramKind {
 // nullptr: there is no such kind.
 [[nodiscard]] const ProgramKind* findKind(std::string_view name);
 // The tables of programs that have this key: "[[router]]", or "[[server]] of program "serial"";
-// empty: there is none.
+// empty: no program has it.
 [[nodiscard]] std::string tablesWith(const std::string& key);
 // The keys that every server program has, and that a crate may set for all of them.
 [[nodiscard]] const std::vector<std::string>& commonKeys();

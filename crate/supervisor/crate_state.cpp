@@ -8,6 +8,7 @@
 #include "base/output_file.h"
 #include "base/system_call.h"
 #include "base/whole_file.h"
+#include "crate/supervisor/child_process.h"
 #include "shm/shortage.h"
 
 namespace mpf::crate {
@@ -33,6 +34,14 @@ CrateState CrateState::read(const std::string& path) try {
   return {};
 } catch (const nlohmann::json::exception&) {
   return {};
+}
+
+std::vector<RecordedProcess> CrateState::running() const {
+  auto running = processes;
+  std::erase_if(running, [](const RecordedProcess& process) {
+    return process.pid == 0 || startTicksOf(process.pid) != process.startTicks;
+  });
+  return running;
 }
 
 void CrateState::write(const std::string& path) const {

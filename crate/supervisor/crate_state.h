@@ -32,6 +32,9 @@ struct CrateState {
 
   //   throws  std::system_error without a free descriptor or memory
   [[nodiscard]] static CrateState read(const std::string& path);
+  // Those of the processes that still run.
+  //   throws  std::system_error without a free descriptor or memory
+  [[nodiscard]] std::vector<RecordedProcess> running() const;
   //   throws  std::system_error
   void write(const std::string& path) const;
 };

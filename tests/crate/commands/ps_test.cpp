@@ -44,6 +44,48 @@ TEST_F(PsTest, SaysThatASupervisorIsStopped) {
   EXPECT_THAT(result.output, HasSubstr("is stopped; `kill -CONT "));
 }
 
+TEST_F(PsTest, ShowsProcessesWhoseSupervisorHasEnded) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto pid = std::to_string(pidOf("int32"));
+  const auto file = files_.file("lab.toml");
+  killSupervisor();
+
+  const auto result = runCommand(MPF " ps");
+  const auto report = nlohmann::json::parse(runCommand(MPF " ps --json").output);
+  const auto stopped = runCommand(MPF " stop 2>&1");
+
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.output, HasSubstr("the supervisor of the crate \"lab\" has ended; 1 of its "
+                                       "processes runs: `mpf run " +
+                                       file + "` takes it over"));
+  EXPECT_THAT(result.output, testing::ContainsRegex("int32 +unsupervised +" + pid));
+  EXPECT_EQ(report.at(0).at("processes").at(0).at("state"), "unsupervised");
+  EXPECT_EQ(WEXITSTATUS(stopped.status), 1);
+  EXPECT_THAT(stopped.output, HasSubstr("mpf stop: the supervisor of the crate \"lab\" has ended"));
+  run();  // takes it over, so that it ends with the test
+  waitForState("int32", "ready");
+  EXPECT_EQ(std::to_string(pidOf("int32")), pid);
+}
+
+TEST_F(PsTest, FilesOfTheOnlyCrateAreShownAfterItsEnd) {
+  run(kServer);
+  waitForState("int32", "ready");
+  stop();
+
+  EXPECT_THAT(runCommand(MPF " logs int32").output, HasSubstr("serving \"Int32\""));
+  EXPECT_EQ(runCommand(MPF " capsule").status, 0);
+  CrateFolder::of("other").create();
+  for (const std::string command : {"logs int32", "capsule"}) {
+    const auto result = runCommand(MPF " " + command + " 2>&1");
+    EXPECT_EQ(WEXITSTATUS(result.status), 1);
+    EXPECT_THAT(result.output, HasSubstr("choose one with --crate NAME: lab, other"));
+    EXPECT_EQ(runCommand(MPF " " + command + " --crate lab").status, 0);
+  }
+  EXPECT_THAT(runCommand(MPF " capsule --crate none 2>&1").output,
+              HasSubstr("there are no files of a crate \"none\""));
+}
+
 class LogsTest : public SupervisorTest {
  protected:
   LogsTest() { folder().create(); }
