@@ -110,10 +110,10 @@ signal = "0=wire:dac.0"
 # port = "/dev/ttyS0"
 # baud = 19200
 
-# [[router]]                       # servers of this host for other hosts
+# [[router]]                       # servers of this host, for other hosts at location 1
 # serve = "1=0"
-# listen = "*:9900"
-# plain = true
+# listen = "127.0.0.1:9900"        # write the private address of this host
+# plain = true                     # without TLS, which other addresses need
 
 # [[ioc]]                          # EPICS records
 # database = ["lab.db"]

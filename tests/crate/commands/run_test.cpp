@@ -2,10 +2,14 @@
 // mpf run and mpf new: names that cannot be names of folders and files; errors that are found
 // before anything is started.
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <filesystem>
+#include <grp.h>
 #include <regex>
 
+#include "base/program_beside.h"
+#include "base/whole_file.h"
 #include "tests/crate/supervisor/supervisor_fixture.h"
 
 namespace mpf::crate::test {
@@ -44,6 +48,26 @@ TEST_F(RunTest, ANewCrateHasANameThatItsCheckAccepts) {
   std::filesystem::create_directory(files_.path() / "folder");
   EXPECT_EQ(mpf("new crate folder/a").status, 0);
   EXPECT_EQ(mpf("run --check folder/a.toml").status, 0);
+}
+
+TEST_F(RunTest, TheExamplesInANewCrateAreRight) {
+  ASSERT_EQ(mpf("new crate lab").status, 0);
+  auto text = readWholeFile(files_.file("lab.toml"));
+  const auto without = [&](const std::string& what, const std::string& with) {
+    text = std::regex_replace(text, std::regex(what), with);
+  };
+  const auto* group = ::getgrgid(::getegid());  // NOLINT(concurrency-mt-unsafe)
+  ASSERT_NE(group, nullptr);
+  without(R"(\n# (\[\[|[a-z-]+ = ))", "\n$1");  // makes comments to entries
+  without("group = \"mpf\"", std::string("group = \"") + group->gr_name + "\"");
+  if (!std::filesystem::exists(programBeside("mpf-ioc"))) without(R"(\[\[ioc\]\][^[]*$)", "");
+  static_cast<void>(files_.write("lab.db", "record(ai, \"$(P)v\") {}\n"));
+  static_cast<void>(files_.write("lab.toml", text));
+
+  const auto result = mpf("run --check lab.toml");
+
+  EXPECT_THAT(text, HasSubstr("\n[[router]]"));
+  EXPECT_THAT(result.output, HasSubstr("processes, no error")) << text;
 }
 
 // ---- errors that this host, or a program, finds
