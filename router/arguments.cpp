@@ -2,6 +2,7 @@
 #include "router/arguments.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <fmt/format.h>
 
@@ -77,6 +78,15 @@ CLI::Option* addEntries(CLI::App& app, const std::string& option, const std::str
       ->allow_extra_args(false);
 }
 
+// Servers of this host are usually at location 0, and clients look for them there.
+void warnOfLocation0(const Remote& remote) {
+  if (std::ranges::find(remote.locations, 0) == remote.locations.end()) return;
+  printError(
+      "{}: warning: location 0 of the remote {} is usually that of servers of this host; offer "
+      "the servers there at another location, with --serve 1=0\n",
+      kProgram, remote.address.text());
+}
+
 // Sets the value of an option that overrides the file; see RouterArguments::overrides_.
 void applyOverride(WrittenConfig& to, const std::string& name, const std::string& value) {
   auto& config = to.config;
@@ -121,6 +131,7 @@ std::optional<int> RouterArguments::start(int argc, const char* const* argv) {
     printError("{}: {}\n", kProgram, error.what());
     return 2;
   }
+  for (const auto& remote : config_.remotes) warnOfLocation0(remote);
   if (!checkOnly_) return std::nullopt;
   fmt::print("{}", describe(config_));
   return 0;

@@ -245,5 +245,15 @@ security = "plain"
           "max-connections 1000 dead-time 2s handshake-time 5s first-retry 100ms last-retry 5s\n"));
 }
 
+TEST_F(ArgumentsTest, WarnsOfARemoteAtTheLocationOfThisHost) {
+  const auto warned = start({"--remote", "0=127.0.0.1:9900", "--plain", "--check"});
+  const auto usual = start({"--remote", "1=127.0.0.1:9900", "--plain", "--check"});
+
+  EXPECT_EQ(warned.status, 0);
+  EXPECT_THAT(warned.err,
+              HasSubstr("mpf-router: warning: location 0 of the remote 127.0.0.1:9900"));
+  EXPECT_THAT(usual.err, IsEmpty());
+}
+
 }  // namespace
 }  // namespace mpf::router::test
