@@ -2,13 +2,16 @@
 #include "shm/window.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <fmt/format.h>
 #include <optional>
+#include <pwd.h>
 #include <system_error>
 #include <thread>
 
@@ -21,6 +24,18 @@
 namespace mpf {
 namespace {
 
+// "user root", the owner of a file; "another user" when the file is gone.
+std::string userOf(const std::string& path) {
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0) return "another user";
+  std::array<char, 4096> texts{};
+  passwd entry{};
+  passwd* found = nullptr;
+  ::getpwuid_r(status.st_uid, &entry, texts.data(), texts.size(), &found);
+  return found != nullptr ? fmt::format("user {}", found->pw_name)
+                          : fmt::format("user {}", status.st_uid);
+}
+
 // Opens the window that has the name that we want; nullopt if no file has this name. For any other
 // file throws an exception that says what to do.
 std::optional<Segment> openConflicting(const std::string& name, layout::SegmentKind kind) try {
@@ -28,7 +43,10 @@ std::optional<Segment> openConflicting(const std::string& name, layout::SegmentK
 } catch (const std::system_error& error) {
   if (error.code().value() == EACCES)
     throw NameInUse(
-        fmt::format("{}: in use by another user: {}", segments::path(name), error.what()));
+        fmt::format("{0}: belongs to {1}, and only that user can tell whether its process is "
+                    "alive; `mpf clean` "
+                    "as that user removes it if the process is dead",
+                    segments::path(name), userOf(segments::path(name))));
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 } catch (const SegmentError& error) {
   if (segments::probeOwner(name) == segments::Owner::alive)

@@ -203,6 +203,24 @@ TEST_F(WindowTest, ADeadWindowThatCannotBeRemovedIsAnError) {
   ASSERT_EQ(::rmdir(path.c_str()), 0);
 }
 
+TEST_F(WindowTest, AWindowOfAnotherUserIsNotCalledInUse) {
+  constexpr uid_t kNobody = 65534;
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can become another user";
+  Child child([&](Child::Self& self) {
+    const auto server = makeServer();
+    self.stay();
+  });
+  child.end(SIGKILL);
+
+  ASSERT_EQ(::seteuid(kNobody), 0);
+  const auto why = whatOf<NameInUse>([&] { static_cast<void>(makeServer()); });
+  ASSERT_EQ(::seteuid(0), 0);
+
+  EXPECT_THAT(why, HasSubstr("belongs to user root, and only that user can tell"));
+  EXPECT_THAT(why, HasSubstr("`mpf clean` as that user removes it"));
+  static_cast<void>(backplane_.removeDead());
+}
+
 TEST_F(WindowTest, AFailedConstructionLeavesNothing) {
   std::string pipe;
 

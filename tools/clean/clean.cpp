@@ -73,7 +73,7 @@ class Cleaner {
   // Returns the exit status.
   int end() {
     if (arguments_.json) fmt::print("{}\n", jsonText(files_));
-    else if (!isAnythingDead_) fmt::print("nothing to remove: no dead process left anything\n");
+    else if (!isAnythingDead_) printNothingToRemove();
     if (!arguments_.dryRun && unknown_ != 0)
       printError("mpf clean: {} could not be judged; `mpf clean --dry-run` says why\n",
                  counted(unknown_, "file"));
@@ -84,6 +84,10 @@ class Cleaner {
   }
 
  private:
+  void printNothingToRemove() const {
+    if (unknown_ == 0) fmt::print("nothing to remove: no dead process left anything\n");
+    else fmt::print("nothing to remove: no file is known to be of a dead process\n");
+  }
   void collect(const Judged& file, bool removed) {
     files_.push_back({{"file", segments::path(file.name)},
                       {"verdict", toString(file.verdict)},

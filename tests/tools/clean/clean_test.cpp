@@ -59,7 +59,10 @@ TEST_F(CleanTest, CountsFilesThatCannotBeJudged) {
   const auto stray = segments::path("mpf." + backplane_.name() + ".notes");
   std::ofstream(stray) << "x";
 
-  EXPECT_THAT(run({"clean"}).err,
+  const auto ended = run({"clean"});
+
+  EXPECT_EQ(ended.out, "nothing to remove: no file is known to be of a dead process\n");
+  EXPECT_THAT(ended.err,
               HasSubstr("mpf clean: 1 file could not be judged; `mpf clean --dry-run` says why\n"));
   EXPECT_TRUE(std::filesystem::remove(stray));
 }
