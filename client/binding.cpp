@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "client/binding.h"
 
+#include <cerrno>
 #include <fmt/format.h>
+#include <system_error>
 
 #include "base/step.h"
 #include "shm/histogram.h"
@@ -19,6 +21,14 @@ Message fateMessage(Fate fate, std::uint32_t requestId, std::int32_t clientType,
   message.setClientExtra(clientExtra);
   message.setRoute({0, requestId, kEndsRequest, nullptr});
   return message;
+}
+
+// What to do about an error, to be appended to its text: about a server that does not admit this
+// user.
+std::string remedyFor(const std::exception& error) {
+  const auto* const failed = dynamic_cast<const std::system_error*>(&error);
+  if (failed == nullptr || failed->code().value() != EACCES) return {};
+  return "; start the server with --mode 0660 --group GROUP, or this program as its user";
 }
 
 }  // namespace
@@ -65,7 +75,7 @@ void Binding::tryConnect() try {
 } catch (const std::exception& error) {
   // No memory, no permission, a window of another version: report the reason and try again later.
   lacksResources_ = shortageOf(error) != layout::Shortage::none;
-  connector_.setReason(error.what());
+  connector_.setReason(error.what() + remedyFor(error));
   connector_.retryLater();
 }
 

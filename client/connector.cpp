@@ -25,6 +25,12 @@ constexpr std::int64_t kBusyNs = 20'000'000;
 
 constexpr std::int64_t kRetryNs = 1'000'000'000;
 
+// Location 0 is that of this host, unless routers are configured in another way.
+std::string absentText(const std::string& server, std::int32_t location) {
+  return fmt::format("server \"{}\" at location {} is not running{}", server, location,
+                     location == 0 ? "" : " or not reachable");
+}
+
 // The local time `agoNs` ago.
 std::string timeText(std::int64_t agoNs) {
   const auto when = std::chrono::system_clock::now() - std::chrono::nanoseconds(agoNs);
@@ -39,7 +45,7 @@ std::string timeText(std::int64_t agoNs) {
 
 void Connector::setServer(const std::string& server, std::int32_t location) {
   SegmentName::checkServer(server);
-  auto reason = fmt::format("server \"{}\" at location {} is not running", server, location);
+  auto reason = absentText(server, location);
   const std::lock_guard lock(mutex_);
   if (!server_.empty())
     throw std::logic_error(
@@ -162,7 +168,7 @@ std::string Connector::notAcceptedBecause(const PeerWindow& server) const {
 
 // Publishes the name of the missing server, for tools, and watches for new servers.
 void Connector::publishPendingBind() {
-  setReason(fmt::format("server \"{}\" at location {} is not running", server_, location_));
+  setReason(absentText(server_, location_));
   parts_.names.start();
   if (pendingBind_) return;
   auto& endpoint = parts_.endpoint;

@@ -22,6 +22,7 @@
 #include "base/stop_signals.h"
 #include "schema/json.h"
 #include "tools/arguments.h"
+#include "tools/call/unreachable.h"
 #include "tools/commands.h"
 #include "tools/text/json_text.h"
 #include "tools/text/show.h"
@@ -113,9 +114,15 @@ class Caller {
     }
   }
 
-  static std::string whyNot(const Answer& answer) {
-    const bool isConnected = answer.refusal() != SendResult::notConnected;
-    return answer.why() + (isConnected ? "" : "; `mpf ls` shows all servers");
+  [[nodiscard]] std::string whyNot(const Answer& answer) const {
+    auto why = answer.why();
+    if (answer.refusal() != SendResult::notConnected) return why;
+    if (why.find("not running") != std::string::npos) {
+      const auto router = whyUnreachable(
+          Snapshot::take(Backplane::named(arguments_.backplane).name()), arguments_.location);
+      if (!router.empty()) why += ": " + router;
+    }
+    return why + "; `mpf ls` shows all servers";
   }
 
   void show(const Message& message) {

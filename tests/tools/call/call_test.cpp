@@ -190,6 +190,29 @@ TEST_F(CallTest, AWrongFieldIsAnErrorThatListsAllFields) {
                                HasSubstr("an integer from -2147483648 to 2147483647")));
 }
 
+TEST_F(CallTest, SaysWhyALocationCannotBeReached) {
+  const auto ended = run({"call", "nobody", "int32", "--location", "7", "--timeout", "0.05"});
+
+  EXPECT_THAT(ended.err,
+              HasSubstr("server \"nobody\" at location 7 is not running or not reachable: no "
+                        "router of this host has a remote with location 7; `mpf ls` shows"));
+}
+
+TEST_F(CallTest, SaysHowAServerAdmitsAnotherUser) {
+  constexpr uid_t kNobody = 65534;
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
+  if (Tool({"--help"}, "", kNobody).end().status != 0)
+    GTEST_SKIP() << "other users cannot execute " << MPF_TEST_TOOL;
+  const EchoThread echo(backplane_, "echo");
+
+  const auto ended =
+      Tool({"call", "echo", "int32", "--timeout", "0.05"}, backplane_.name(), kNobody).end();
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.err,
+              HasSubstr("Permission denied; start the server with --mode 0660 --group "));
+}
+
 TEST_F(CallTest, NamesAnAbsentServer) {
   const auto ended = run({"call", "nobody", "int32", "--timeout", "0.05"});
 

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Why a location cannot be reached, from the rows of a router.
+#include "tools/call/unreachable.h"
+
+#include <mpf/message_server.h>
+
+#include "tests/shm/shm_fixture.h"
+#include "tests/tools/report/router_rows.h"
+
+namespace mpf::tools {
+namespace {
+
+class WhyUnreachableTest : public test::ShmTest {
+ protected:
+  [[nodiscard]] std::string why(std::int32_t location) const {
+    return whyUnreachable(Snapshot::take(name()), location);
+  }
+};
+
+TEST_F(WhyUnreachableTest, NothingIsKnownOfServersOfThisHost) {
+  const MessageServer server(backplane_, "echo", {.location = 3});
+
+  EXPECT_EQ(why(0), "");
+  EXPECT_EQ(why(3), "");
+}
+
+TEST_F(WhyUnreachableTest, NoRouterHasTheLocation) {
+  EXPECT_EQ(why(1), "no router of this host has a remote with location 1");
+  router::Statistics statistics(backplane_, "lab1");
+  const auto remote = test::connectedRemote(statistics, {2});
+  EXPECT_EQ(why(1), "no router of this host has a remote with location 1");
+}
+
+TEST_F(WhyUnreachableTest, TheRouterIsNotConnected) {
+  router::Statistics statistics(backplane_, "lab1");
+  const auto remote = test::lostRemote(statistics);
+
+  EXPECT_EQ(why(8), "the router is not connected to 10.0.0.8:9900: connect(): Connection refused");
+}
+
+TEST_F(WhyUnreachableTest, TheOtherHostHasNoSuchServerOrRefuses) {
+  router::Statistics statistics(backplane_, "lab1");
+  const auto remote = test::connectedRemote(statistics, {1, 2});
+
+  EXPECT_EQ(why(2),
+            "the router is connected to ioc1: no server of this name runs there, or the [[allow]] "
+            "rules of ioc1 refuse it");
+}
+
+}  // namespace
+}  // namespace mpf::tools
