@@ -12,6 +12,9 @@ namespace {
 std::string posture(const SnapshotDelta& delta, const WindowView& window, std::uint32_t index,
                     bool isPolled) {
   const auto state = delta.stateOf(window);
+  // A process that polls, but takes nothing, may compute, or sleep anywhere but on its window.
+  if (isPolled && state == "stalled" && window.sleeping == layout::SleepState::awake)
+    return "(stalled, not asleep on its window)";
   const auto* told = isPolled                      ? "it polls"
                      : window.hints.isReady(index) ? "ready bit set"
                                                    : "no ready bit";

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "tools/report/report.h"
 
+#include <algorithm>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <mpf/backplane.h>
 
@@ -27,9 +29,16 @@ int reportEach(const ReportArguments& arguments,
                const std::function<void(const SnapshotDelta&)>& print,
                const std::function<void(const SnapshotDelta&, nlohmann::json& list)>& collect) {
   auto list = nlohmann::json::array();
-  const auto backplanes =
-      arguments.backplane.empty() ? Backplane::names() : std::vector{arguments.backplane};
+  const auto backplanes = arguments.backplane.empty()
+                              ? Backplane::names()
+                              : std::vector{Backplane::named(arguments.backplane).name()};
+  const auto all = Backplane::names();
   for (const auto& backplane : backplanes) {
+    if (!arguments.json && std::ranges::find(all, backplane) == all.end()) {
+      fmt::print("backplane {} has no process{}\n", backplane,
+                 all.empty() ? "" : fmt::format("; use one of {}", fmt::join(all, ", ")));
+      continue;
+    }
     const SnapshotDelta delta(backplane, arguments.interval);
     if (arguments.json) collect(delta, list);
     else print(delta);

@@ -67,6 +67,17 @@ TEST_F(WaitsTest, RepliesWaitForTheClient) {
   EXPECT_EQ(waits(), "1 reply waits for the client (asleep on its pipe, it polls)");
 }
 
+TEST_F(WaitsTest, AStalledClientThatIsNotAsleepDoesNotPoll) {
+  link_.replies = {52, 5};
+  link_.isPolledByClient = true;
+  client_.links = {link_};
+  const SnapshotDelta delta(test::snapshotOf(0, {server_}, {client_}),
+                            test::snapshotOf(test::kHalfASecond, {server_}, {client_}));
+
+  EXPECT_EQ(waitsOf(delta, link_),
+            "47 replies wait for the client (stalled, not asleep on its window)");
+}
+
 TEST_F(WaitsTest, BothDirectionsMayWait) {
   link_.requests = {6, 5};
   link_.replies = {6, 5};

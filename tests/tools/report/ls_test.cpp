@@ -208,5 +208,15 @@ TEST_F(ReportTest, RatesAreThoseBetweenTheSnapshots) {
   EXPECT_EQ(load.end().status, 0);
 }
 
+TEST_F(ReportTest, SaysThatABackplaneHasNoProcess) {
+  const EchoThread echo(backplane_, "echo");
+
+  const auto ended = run({"ls", "--backplane", backplane_.name() + "-typo"});
+
+  EXPECT_THAT(ended.out, testing::StartsWith("backplane " + backplane_.name() +
+                                             "-typo has no process; there are "));
+  EXPECT_THAT(ended.out, HasSubstr(backplane_.name()));
+}
+
 }  // namespace
 }  // namespace mpf::test
