@@ -166,7 +166,7 @@ std::string shellText(const ProcessPlan& plan) {
   std::string text;
   for (const auto& [name, value] : plan.environment) text += name + "=" + quoted(value) + " ";
   for (const auto& word : plan.command) text += quoted(word) + " ";
-  text.pop_back();
+  if (!text.empty()) text.pop_back();
   return text;
 }
 

@@ -41,7 +41,8 @@ struct ProcessPlan {
 [[nodiscard]] std::vector<ProcessPlan> planProcesses(const Crate& crate,
                                                      const std::string& runFolder);
 
-// The command line as a shell would read it, with its environment: "A=b mpf-x 'an argument'".
+// The command line as a shell would read it, with its environment: "A=b mpf-x 'an argument'"; empty
+// for the plan of a process that is no longer in the crate.
 [[nodiscard]] std::string shellText(const ProcessPlan& plan);
 
 }  // namespace mpf::crate

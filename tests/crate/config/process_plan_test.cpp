@@ -121,6 +121,8 @@ TEST(ShellText, QuotesWhatAShellWouldChange) {
   EXPECT_EQ(shellText(plan), R"(A='x y' mpf-x 'a[0]' 'it'\''s' '' --b=c,d)");
 }
 
+TEST(ShellText, APlanWithoutACommandHasNoText) { EXPECT_EQ(shellText(ProcessPlan()), ""); }
+
 }  // namespace
 }  // namespace mpf::crate::test
 // NOLINTEND(modernize-raw-string-literal)

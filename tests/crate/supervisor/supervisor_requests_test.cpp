@@ -109,6 +109,21 @@ TEST_F(SupervisorRequestsTest, AnInvalidFileChangesNothing) {
   EXPECT_EQ(stateOf("int32"), "ready");
 }
 
+TEST_F(SupervisorRequestsTest, ATakenOverProcessThatTheCrateHasNoMoreIsEndedBesideNewOnes) {
+  const std::string slow =
+      "[[program]]\nname = \"slow\"\ncommand = [\"sh\", \"-c\", "
+      "\"trap '' TERM; while :; do sleep 0.1; done\"]\n";
+  run(kServer + slow);
+  waitForState("int32", "ready");
+  waitForState("slow", "ready");
+  killSupervisor();
+
+  run(kServer + kServer + "name = \"two\"\nserver = \"Two\"\n", "stop-time = \"1ms\"\n");
+
+  waitForState("two", "ready");  // recorded while the other one ends
+  waitForState("slow", "absent");
+}
+
 }  // namespace
 }  // namespace mpf::crate::test
 // NOLINTEND(modernize-raw-string-literal)
