@@ -39,6 +39,15 @@ json processOf(const json& report, const std::string& name) {
   return found;
 }
 
+// Whether a process that counts as ready is so. A program that has no servers and does not report
+// counts as ready when it is started, and may end at once because its arguments are wrong.
+bool isReady(const json& process) {
+  constexpr double kLookS = 1;
+  return process.at("state") == "ready" &&
+         (process.at("notifies") == true || !process.at("servers").empty() ||
+          process.at("upS") >= kLookS);
+}
+
 // Waits until the process is in one of the states in which nothing more happens, and prints it.
 //   throws  std::runtime_error when it has failed, or is in another state at the deadline
 void waitFor(const CrateFolder& folder, const ControlArguments& arguments, const Deadline& deadline,
@@ -47,7 +56,7 @@ void waitFor(const CrateFolder& folder, const ControlArguments& arguments, const
     const auto process = processOf(askSupervisor(folder, {{"do", "ps"}}), arguments.process);
     const auto state = process.value("state", "gone");
     const auto isNew = process.value("pid", 0) != pidBefore;
-    if (state == "stopped" || state == "gone" || (!isStop && state == "ready" && isNew)) {
+    if (state == "stopped" || state == "gone" || (!isStop && isNew && isReady(process))) {
       fmt::print("{} is {}\n", arguments.process, state);
       return;
     }

@@ -12,11 +12,12 @@ namespace mpf::crate {
 
 [[nodiscard]] inline nlohmann::json toJson(const Service& service) {
   const auto upNs = service.isRunning() ? Clock::nowNs() - service.startedNs() : 0;
-  return {{"name", service.plan().name},       {"state", toString(service.state())},
-          {"isStalled", service.isStalled()},  {"pid", service.pid()},
-          {"restarts", service.restarts()},    {"upS", static_cast<double>(upNs) / 1e9},
-          {"reason", service.reason()},        {"needs", service.plan().needs},
-          {"servers", service.plan().servers}, {"command", service.plan().command}};
+  return {{"name", service.plan().name},        {"state", toString(service.state())},
+          {"isStalled", service.isStalled()},   {"pid", service.pid()},
+          {"restarts", service.restarts()},     {"upS", static_cast<double>(upNs) / 1e9},
+          {"reason", service.reason()},         {"needs", service.plan().needs},
+          {"servers", service.plan().servers},  {"command", service.plan().command},
+          {"notifies", service.plan().notifies}};
 }
 
 }  // namespace mpf::crate

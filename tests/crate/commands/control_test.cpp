@@ -49,12 +49,23 @@ TEST_F(ControlTest, AReloadReturnsWhenTheProcessesAreReady) {
 
 TEST_F(ControlTest, AReloadSaysWhichProcessFails) {
   run(kServer);
-  write(kServer + "[[program]]\nname = \"wrong\"\ncommand = [\"sh\", \"-c\", \"exit 2\"]\n");
+  write(kServer +
+        "[[program]]\nname = \"wrong\"\ncommand = [\"sh\", \"-c\", \"exit 2\"]\nservers = "
+        "[\"never\"]\n");
 
   const auto result = runCommand(MPF " reload --wait 900 2>&1");
 
   EXPECT_EQ(WEXITSTATUS(result.status), 1);
   EXPECT_THAT(result.output, HasSubstr("mpf reload: wrong has failed: exit status 2"));
+}
+
+TEST_F(ControlTest, AProgramThatDoesNotReportIsLookedAtForASecond) {
+  run("[[program]]\nname = \"mute\"\ncommand = [\"sleep\", \"1000\"]\n");
+  waitForState("mute", "ready");
+
+  EXPECT_EQ(runCommand(MPF " restart mute --wait 900").status, 0);
+
+  EXPECT_GE(process("mute").at("upS"), 1);
 }
 
 TEST_F(ControlTest, AStopNamesTheProcessesThatContinue) {
