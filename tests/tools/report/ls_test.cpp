@@ -214,7 +214,7 @@ TEST_F(ReportTest, SaysThatABackplaneHasNoProcess) {
   const auto ended = run({"ls", "--backplane", backplane_.name() + "-typo"});
 
   EXPECT_THAT(ended.out, testing::StartsWith("backplane " + backplane_.name() +
-                                             "-typo has no process; there are "));
+                                             "-typo has no process; use one of "));
   EXPECT_THAT(ended.out, HasSubstr(backplane_.name()));
 }
 
