@@ -30,7 +30,6 @@ class BindingRounds {
   void add(Place&& place);
   // A binding that was added stays alive until dropRemoved().
   void remove(const Binding& binding) noexcept;
-  [[nodiscard]] bool hasRemoved() const noexcept { return !removed_.empty(); }
   // No callback of a removed binding is in progress.
   void dropRemoved() noexcept;
 

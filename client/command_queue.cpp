@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "client/command_queue.h"
 
-#include <condition_variable>
-#include <memory>
 #include <utility>
 
 namespace mpf {
@@ -21,41 +19,70 @@ void CommandQueue::postLater(Command command) {
   wake_();
 }
 
-void CommandQueue::runOrPost(const Command& command) {
-  if (lock_.isMine()) return command();
-  if (!lock_.tryAcquireTemporarily()) return postLater(command);
+bool CommandQueue::tryRun(const Command& command) {
+  if (lock_.isMine()) {
+    command();
+    return true;
+  }
+  if (!lock_.tryAcquireTemporarily()) return false;
   const RunnerGuard guard(&lock_);
   command();
+  return true;
+}
+
+void CommandQueue::runOrPost(const Command& command) {
+  if (!tryRun(command)) postLater(command);
 }
 
 // The thread that runs the dispatcher may stop before it has seen the command; then the caller runs
 // the command.
-void CommandQueue::runOrPostAndWait(const Command& command, bool hasOwnThread) {
-  if (lock_.isMine()) return command();
-  struct State {
-    bool isStarted = false;  // under lock_
-    bool isDone = false;  // under mutex
-    std::mutex mutex;
-    std::condition_variable changed;
-  };
-  const auto state = std::make_shared<State>();
-  const auto runFirst = [state, &command] {
-    if (std::exchange(state->isStarted, true)) return;
-    command();
-    const std::lock_guard lock(state->mutex);
-    state->isDone = true;
-    state->changed.notify_one();
-  };
-  const auto isDone = [&] { return state->isDone; };
-  for (bool isPosted = false;; isPosted = true) {
-    if (lock_.tryAcquireTemporarily()) {
-      const RunnerGuard guard(&lock_);
-      return runFirst();
-    }
-    if (!isPosted) postLater(runFirst);
-    std::unique_lock lock(state->mutex);
-    if (hasOwnThread) return state->changed.wait(lock, isDone);
-    if (state->changed.wait_for(lock, kLookForRunner, isDone)) return;
+void CommandQueue::runOrWait(const Command& command, bool hasOwnThread) {
+  if (tryRun(command)) return;
+  Waiting waiting{command};
+  add(waiting);
+  wake_();
+  const auto isDone = [&waiting] { return waiting.isDone; };
+  for (;;) {
+    std::unique_lock lock(mutex_);
+    if (hasOwnThread) return waiting.changed.wait(lock, isDone);
+    if (waiting.changed.wait_for(lock, kLookForRunner, isDone)) return;
+    lock.unlock();
+    if (!lock_.tryAcquireTemporarily()) continue;
+    const RunnerGuard guard(&lock_);
+    if (tryRemove(waiting)) command();
+    return;
+  }
+}
+
+void CommandQueue::add(Waiting& waiting) noexcept {
+  const std::lock_guard lock(mutex_);
+  waiting.next = std::exchange(waiting_, &waiting);
+  hasWaiting_.store(true, std::memory_order_relaxed);
+}
+
+// Returns false when another thread has run the command.
+bool CommandQueue::tryRemove(Waiting& waiting) noexcept {
+  const std::lock_guard lock(mutex_);
+  for (auto** place = &waiting_; *place != nullptr; place = &(*place)->next) {
+    if (*place != &waiting) continue;
+    *place = waiting.next;
+    hasWaiting_.store(waiting_ != nullptr, std::memory_order_relaxed);
+    return true;
+  }
+  return false;
+}
+
+void CommandQueue::runWaiting() noexcept {
+  std::unique_lock lock(mutex_);
+  hasWaiting_.store(false, std::memory_order_relaxed);
+  for (auto* waiting = std::exchange(waiting_, nullptr); waiting != nullptr;) {
+    auto* const next = waiting->next;
+    lock.unlock();
+    waiting->command();
+    lock.lock();
+    waiting->isDone = true;
+    waiting->changed.notify_one();  // under the lock: then the thread may destroy it
+    waiting = next;
   }
 }
 

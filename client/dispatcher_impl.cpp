@@ -16,13 +16,13 @@ constexpr std::uint32_t kWakeupsPerClockCheck = 64;  // wake-ups without work be
 
 class DepthGuard {
  public:
-  explicit DepthGuard(int& depth) noexcept : depth_(depth) { ++depth_; }
+  explicit DepthGuard(std::uint32_t& depth) noexcept : depth_(depth) { ++depth_; }
   ~DepthGuard() { --depth_; }
   DepthGuard(const DepthGuard&) = delete;
   DepthGuard& operator=(const DepthGuard&) = delete;
 
  private:
-  int& depth_;
+  std::uint32_t& depth_;
 };
 
 }  // namespace
@@ -70,8 +70,23 @@ void Dispatcher::Impl::endThread() {
   }
 }
 
-bool Dispatcher::Impl::takeStop() noexcept {
-  return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed);
+void Dispatcher::Impl::remove(Binding& binding) {
+  const auto command = [this, &binding] {
+    binding.leave();
+    bindings_.remove(binding);
+    if (depth_ == 0) bindings_.dropRemoved();
+    else hasPostponed_ = true;
+  };
+  parts_.commands.runOrWait(command, hasThread_);
+}
+
+// interrupt() ends the calls of all depths: the innermost one takes it, and leaves it to the outer
+// ones. A callback may go on to run the dispatcher in its depth.
+bool Dispatcher::Impl::takeStopOf(std::uint32_t depth) noexcept {
+  auto stop = stop_.load(std::memory_order_relaxed);
+  while (stop > depth && !stop_.compare_exchange_weak(stop, depth, std::memory_order_relaxed)) {
+  }
+  return stop > depth;
 }
 
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
@@ -130,9 +145,8 @@ void Dispatcher::Impl::dropKnocks() noexcept {
 
 // Inline, because it is on the path of each message.
 [[gnu::always_inline]] inline bool Dispatcher::Impl::tryStep() {
-  // A callback may run the dispatcher, too: bindings whose callback is in progress stay alive.
+  if (hasPostponed_ && depth_ == 0) handlePostponed();
   const DepthGuard inside(depth_);
-  if (bindings_.hasRemoved() && depth_ == 1) bindings_.dropRemoved();
   const bool hasActed = endpoint().takeLocalEvent() && handleLocalHints();
   return takeFrom(endpoint().nextPolled()) || tryOthers() || hasActed;
 }
@@ -153,7 +167,7 @@ bool Dispatcher::Impl::tryOthers() {
 }
 
 void Dispatcher::Impl::interrupt() noexcept {
-  stop_.store(true, std::memory_order_relaxed);
+  stop_.store(kAll, std::memory_order_relaxed);
   endpoint().interrupt();
 }
 
@@ -182,13 +196,24 @@ bool Dispatcher::Impl::runSome(int most) {
   return false;
 }
 
-// Handles commands, deaths of peers and new names. Returns true when callbacks may have run.
+// Handles commands, deaths of peers and new names. Returns true when callbacks may have run, or the
+// next step has work.
 bool Dispatcher::Impl::handleLocalHints() {
   const bool hasCalled = parts_.commands.hasCommands();
   if (hasCalled) parts_.commands.run();
   if (endpoint().takePeerDeath()) bindings_.beginDead();
   if (parts_.names.takeChange()) bindings_.beginWaiting();
-  return hasCalled;
+  if (!parts_.commands.hasWaiting()) return hasCalled;
+  hasPostponed_ = true;
+  return true;
+}
+
+// What waits until no callback is in progress: a callback may run the dispatcher. Bindings whose
+// callback is in progress stay alive, and threads that destroy a client wait for its end.
+[[gnu::noinline]] void Dispatcher::Impl::handlePostponed() noexcept {
+  hasPostponed_ = false;
+  bindings_.dropRemoved();
+  parts_.commands.runWaiting();
 }
 
 }  // namespace mpf

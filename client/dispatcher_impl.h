@@ -48,10 +48,9 @@ class Dispatcher::Impl {
   // --- any thread ---
   void interrupt() noexcept;
   [[nodiscard]] Deadline nextDue() const noexcept { return parts_.timer.due(); }
-  // As CommandQueue::runOrPostAndWait().
-  void runOrPostAndWait(const CommandQueue::Command& command) {
-    parts_.commands.runOrPostAndWait(command, hasThread_);
-  }
+  // Ends a client: none of its callbacks runs afterwards. Waits until the callback in progress has
+  // returned, unless it runs on the calling thread.
+  void remove(Binding& binding);
   [[nodiscard]] CommandQueue& commands() noexcept { return parts_.commands; }
   // True for a shared dispatcher: only its own thread runs it.
   [[nodiscard]] bool hasThread() const noexcept { return hasThread_; }
@@ -67,19 +66,26 @@ class Dispatcher::Impl {
   }
   template <class IsOver>
   bool run(Deadline deadline, const IsOver& isOver);
-  bool takeStop() noexcept;
+  [[nodiscard]] bool takeStop() noexcept {
+    return stop_.load(std::memory_order_relaxed) != 0 && takeStopOf(depth_);
+  }
+  bool takeStopOf(std::uint32_t depth) noexcept;
   bool step();
   bool tryStep();
   bool tryOthers();
   bool takeFrom(Link* link);
   void dropKnocks() noexcept;
   bool handleLocalHints();
+  void handlePostponed() noexcept;
 
   DispatcherParts parts_;
   BindingRounds bindings_{parts_};
-  std::atomic<bool> stop_{false};
+  // kAll: interrupt() was called. Otherwise, calls in less than so many nested steps must return.
+  std::atomic<std::uint32_t> stop_{0};
+  static constexpr std::uint32_t kAll = UINT32_MAX;
   std::atomic<bool> ended_{false};
-  int depth_ = 0;  // of nested steps: a callback may run the dispatcher
+  std::uint32_t depth_ = 0;  // of nested steps: a callback may run the dispatcher
+  bool hasPostponed_ = false;  // there is work for handlePostponed()
   bool hasDescriptor_ = false;
   bool hasThread_ = false;
   std::thread thread_;

@@ -48,10 +48,7 @@ MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
 
 MessageClient::~MessageClient() {
   if (isInherited()) return;
-  dispatcher_->runOrPostAndWait([&] {
-    binding_->leave();
-    dispatcher_->bindings().remove(*binding_);
-  });
+  dispatcher_->remove(*binding_);
 }
 
 void MessageClient::bind(const std::string& server, std::int32_t location) {
@@ -112,17 +109,20 @@ std::string MessageClient::notConnectedBecause() const {
 
 bool MessageClient::connectWait(Nanoseconds timeout) {
   if (isInherited()) return false;
+  // A callback that this function runs may destroy the client.
+  const auto dispatcher = dispatcher_;
+  const auto binding = binding_;
   const auto deadline = Deadline::after(timeout);
-  const auto isDone = [this] { return isConnected(); };
+  const auto isDone = [&binding] { return binding->isConnected() || binding->hasLeft(); };
   while (!isDone() && !deadline.hasPassed()) {
-    if (dispatcher_->tryRunUntil(deadline, isDone)) continue;
+    if (dispatcher->tryRunUntil(deadline, isDone)) continue;
     // Another thread runs the dispatcher; if it stops, this thread must run it.
-    static_cast<void>(binding_->waitConnected(
-        dispatcher_->hasThread()
+    static_cast<void>(binding->waitConnected(
+        dispatcher->hasThread()
             ? deadline
             : std::min(deadline, Deadline::after(CommandQueue::kLookForRunner))));
   }
-  return isConnected();
+  return binding->isConnected();
 }
 
 }  // namespace mpf

@@ -62,8 +62,8 @@ class Dispatcher {
   bool runOnce(Deadline deadline = Deadline::never());
   // Runs until interrupt(). Throws as runOnce().
   void run();
-  // Ends the call of run() or runOnce() that is in progress, or else the next one. Any thread;
-  // async-signal-safe.
+  // Ends the call of run() or runOnce() that is in progress, or else the next one. If a callback
+  // runs the dispatcher, ends its call and each one around it. Any thread; async-signal-safe.
   void interrupt() noexcept;
 
   // For event loops: poll() the descriptor for reading, at most until nextDeadline(), then call

@@ -6,12 +6,14 @@
 //   const auto result = client.send(mpf::Int32Message({.address = 3, .value = 100}));
 //
 // The callback receives replies, ConnectMessages (connected, disconnected, queue full) and
-// RequestFateMessages, one at a time, in the order of the events. Each request that send() accepted
-// ends in exactly one reply or one fate; a server may send further replies after the first.
+// RequestFateMessages, one at a time, in the order of the events. Only a callback that runs the
+// dispatcher itself (connectWait(), runOnce()) may see others begin and return inside it, also of
+// its own client. Each request that send() accepted ends in exactly one reply or one fate; a server
+// may send further replies after the first.
 //
 // Threads  any thread may construct a client, bind, send, cancel and wait for the connection.
 //          Callbacks run on the thread that runs the dispatcher; they may call all functions of the
-//          client and destroy it.
+//          client and destroy it. No other thread may then be in a function of that client.
 // Throws   a callback may throw: see Dispatcher. All other requests still get their reply or fate,
 //          and the client stays bound.
 // Crash    when a server dies, the client delivers the replies that the server had sent, a fate for
@@ -75,7 +77,7 @@ class MessageClient {
   MessageClient(Dispatcher& dispatcher, Callback callback);
   // No callback runs after the destructor has returned. Unless it is called on the thread that runs
   // the dispatcher, it waits until the callback in progress, of any client of the dispatcher, has
-  // returned.
+  // returned, even if that callback runs the dispatcher.
   ~MessageClient();
   MessageClient(const MessageClient&) = delete;
   MessageClient& operator=(const MessageClient&) = delete;
@@ -172,7 +174,8 @@ class MessageClient {
 
   // Waits until the client is connected; returns false after `timeout`. If the dispatcher has a
   // thread, or another thread runs it or ran it last, the call waits for that thread; otherwise it
-  // runs the dispatcher itself. SyncClient::connectWait() always runs its dispatcher.
+  // runs the dispatcher itself. SyncClient::connectWait() always runs its dispatcher. When a
+  // callback that it runs destroys the client, it returns false.
   //   throws  the exception of a callback that it runs
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
   [[nodiscard]] bool isConnected() const noexcept;

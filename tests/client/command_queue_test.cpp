@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "tests/support/watchdog.h"
 
@@ -60,7 +61,7 @@ TEST_F(CommandQueueTest, TheRunnerRunsItsOwnCommandsNow) {
 
   queue_.post(note('a'));
   queue_.runOrPost(note('b'));
-  queue_.runOrPostAndWait(note('c'), false);
+  queue_.runOrWait(note('c'), false);
   queue_.postLater(note('d'));
 
   EXPECT_EQ(ran_, "abc");
@@ -68,7 +69,7 @@ TEST_F(CommandQueueTest, TheRunnerRunsItsOwnCommandsNow) {
 
 TEST_F(CommandQueueTest, RunOrPostRunsACommandNowWhenNoThreadRunsTheDispatcher) {
   queue_.runOrPost(note('a'));
-  queue_.runOrPostAndWait(note('b'), false);
+  queue_.runOrWait(note('b'), false);
 
   EXPECT_EQ(ran_, "ab");
   EXPECT_FALSE(queue_.hasCommands());
@@ -107,13 +108,13 @@ TEST_F(CommandQueueTest, ACommandThatThrowsLeavesTheOthersPosted) {
 // Each of the two threads may run the command; it runs once.
 TEST_F(CommandQueueTest, AWaitingThreadRunsItsCommandWhenTheRunnerStops) {
   lock_.acquire([] {});
-  std::thread waiting([this] { queue_.runOrPostAndWait(note('a'), false); });
-  while (!queue_.hasCommands()) std::this_thread::yield();
+  std::thread waiting([this] { queue_.runOrWait(note('a'), false); });
+  while (!queue_.hasWaiting()) std::this_thread::yield();
 
   lock_.release();
   waiting.join();
   EXPECT_EQ(ran_, "a");
-  queue_.run();
+  queue_.runWaiting();
 
   EXPECT_EQ(ran_, "a");
 }
@@ -121,13 +122,41 @@ TEST_F(CommandQueueTest, AWaitingThreadRunsItsCommandWhenTheRunnerStops) {
 TEST_F(CommandQueueTest, AWaitingThreadReturnsWhenTheRunnerHasRunItsCommand) {
   lock_.acquire([] {});
   const RunnerGuard guard(&lock_);
-  std::thread waiting([this] { queue_.runOrPostAndWait(note('a'), true); });
-  while (!queue_.hasCommands()) std::this_thread::yield();
+  std::thread waiting([this] { queue_.runOrWait(note('a'), true); });
+  while (!queue_.hasWaiting()) std::this_thread::yield();
 
   queue_.run();
+  EXPECT_EQ(ran_, "");
+  queue_.runWaiting();
   waiting.join();
 
   EXPECT_EQ(ran_, "a");
+}
+
+TEST_F(CommandQueueTest, ManyThreadsMayWait) {
+  constexpr int kThreads = 5;
+  std::vector<std::thread> threads;
+  {
+    lock_.acquire([] {});
+    const RunnerGuard guard(&lock_);
+    for (int i = 0; i < kThreads; ++i)
+      threads.emplace_back([this] { queue_.runOrWait(note('a'), false); });
+    while (ran_.empty()) queue_.runWaiting();
+  }
+
+  for (auto& thread : threads) thread.join();
+
+  EXPECT_EQ(ran_, std::string(kThreads, 'a'));
+  EXPECT_FALSE(queue_.hasWaiting());
+}
+
+TEST_F(CommandQueueTest, TryRunRunsNothingBesideARunner) {
+  besideARunner([&] { EXPECT_FALSE(queue_.tryRun(note('a'))); });
+  EXPECT_EQ(ran_, "");
+
+  EXPECT_TRUE(queue_.tryRun(note('b')));
+
+  EXPECT_EQ(ran_, "b");
 }
 
 }  // namespace
