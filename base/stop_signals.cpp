@@ -43,11 +43,19 @@ void stop(int) {
   errno = savedErrno;
 }
 
-// The child of a fork does not have the parent's other threads, so none of them executes stop().
-void forgetOthers() noexcept { handling.store(0, std::memory_order_relaxed); }
+// The child of a fork does not have the parent's other threads: none of them executes stop(), or
+// holds the mutex.
+void watchForks() {
+  const auto lock = [] { installMutex.lock(); };
+  const auto unlock = [] { installMutex.unlock(); };
+  const auto unlockInChild = [] {
+    handling.store(0, std::memory_order_relaxed);
+    installMutex.unlock();
+  };
+  [[maybe_unused]] static const int once = ::pthread_atfork(lock, unlock, unlockInChild);
+}
 
 void install() {
-  [[maybe_unused]] static const int once = ::pthread_atfork(nullptr, nullptr, forgetOthers);
   struct sigaction action{};
   action.sa_handler = stop;
   ::sigemptyset(&action.sa_mask);
@@ -63,6 +71,7 @@ void uninstall() {
 }  // namespace
 
 StopSignals::StopSignals(Callback callback, void* argument) : slot_(0) {
+  watchForks();
   const std::lock_guard lock(installMutex);
   while (slot_ < slots.size() && slots[slot_].used.exchange(true, std::memory_order_relaxed))
     ++slot_;

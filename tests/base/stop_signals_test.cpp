@@ -77,5 +77,35 @@ TEST_F(StopSignalsTest, DestructorReturnsInAChildForkedDuringTheCallback) {
   EXPECT_EQ(status, 0);
 }
 
+// The destructor holds a mutex while it waits for the callback.
+TEST_F(StopSignalsTest, AChildForkedDuringADestructorMayCatchSignals) {
+  interruptOther([](void* test) noexcept {
+    auto& self = *static_cast<StopSignalsTest*>(test);
+    self.entered = true;
+    while (!self.mayLeave) ::usleep(1000);
+  });
+  std::thread destroying([this] { signals.reset(); });
+  std::thread releasing([this] {
+    ::usleep(20'000);  // so that a fork that does not wait for the destructor comes first
+    mayLeave = true;
+  });
+  ::usleep(5'000);
+
+  const auto child = checkCall(::fork(), "fork");
+  if (child == 0) {
+    ::alarm(60);
+    {
+      const StopSignals own([](void*) noexcept {}, nullptr);
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  releasing.join();
+  destroying.join();
+
+  EXPECT_EQ(status, 0);
+}
+
 }  // namespace
 }  // namespace mpf::test
