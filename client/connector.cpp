@@ -68,7 +68,7 @@ void Connector::setReason(const std::string& reason) {
 void Connector::notifyConnected() {
   const std::lock_guard lock(mutex_);
   const auto former = std::exchange(reason_, {});  // frees its memory
-  connected_.notify_all();
+  connected_.get().notify_all();
 }
 
 void Connector::retryLater() noexcept { timer_.wakeAt(Clock::nowNs() + kRetryNs); }

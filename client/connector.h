@@ -6,7 +6,6 @@
 // Crash    a failed attempt leaves no segment and no index in use; the timer starts the next one.
 #pragma once
 
-#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -16,6 +15,7 @@
 #include "client/binding_timer.h"
 #include "client/dispatcher_parts.h"
 #include "client/request_sender.h"
+#include "shm/process_condition.h"
 
 namespace mpf {
 
@@ -31,8 +31,8 @@ class Connector {
   template <class IsConnected>
   bool wait(Deadline deadline, const IsConnected& isConnected) {
     std::unique_lock lock(mutex_);
-    if (!deadline.isNever()) return connected_.wait_for(lock, deadline.left(), isConnected);
-    connected_.wait(lock, isConnected);
+    if (!deadline.isNever()) return connected_.get().wait_for(lock, deadline.left(), isConnected);
+    connected_.get().wait(lock, isConnected);
     return true;
   }
 
@@ -73,10 +73,10 @@ class Connector {
   std::uint64_t incarnation_ = 0;
   std::unique_ptr<Segment> pendingBind_;  // while the client waits for a server
   mutable std::mutex mutex_;
-  std::condition_variable connected_;
+  ProcessCondition connected_;
   std::string reason_ = "not bound to a server yet";  // under mutex_; empty while connected
 };
 // A router has one for each remote client.
-static_assert(sizeof(Connector) <= 152 + sizeof(std::mutex));
+static_assert(sizeof(Connector) <= 160 + sizeof(std::mutex));
 
 }  // namespace mpf

@@ -6,20 +6,29 @@
 #include <string>
 
 #include "client/dispatcher_impl.h"
+#include "shm/per_process.h"
 
 namespace mpf {
+namespace {
+
+struct SharedDispatchers {
+  std::mutex mutex;  // guards the members below
+  std::map<std::string, std::weak_ptr<Dispatcher>> ofBackplanes;
+};
+
+}  // namespace
 
 Dispatcher::Dispatcher(const Backplane& backplane, const DispatcherOptions& options)
     : impl_(std::make_shared<Impl>(backplane, options)) {}
 Dispatcher::~Dispatcher() { impl_->endThread(); }
 
 std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
-  static std::mutex mutex;
-  static std::map<std::string, std::weak_ptr<Dispatcher>> dispatchers;
-  const std::lock_guard lock(mutex);
-  auto& known = dispatchers[backplane.name()];
+  static PerProcess<SharedDispatchers> ofProcess;
+  auto& shared = ofProcess.get();
+  const std::lock_guard lock(shared.mutex);
+  auto& known = shared.ofBackplanes[backplane.name()];
   auto dispatcher = known.lock();
-  if (!dispatcher || dispatcher->impl_->endpoint().forkGuard().isInherited()) {
+  if (!dispatcher) {
     dispatcher = std::make_shared<Dispatcher>(backplane);
     dispatcher->impl_->startThread(dispatcher->impl_);
     known = dispatcher;

@@ -2,6 +2,7 @@
 #include <mpf/message_client.h>
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "client/binding.h"
 #include "client/dispatcher_impl.h"
@@ -37,8 +38,10 @@ MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callba
 }
 
 MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
-    : dispatcher_(dispatcher.impl_),
-      binding_(std::make_shared<Binding>(dispatcher_->parts(), std::move(callback))) {
+    : dispatcher_(dispatcher.impl_) {
+  dispatcher_->endpoint().forkGuard().check("Dispatcher");
+  if (!callback) throw std::invalid_argument("MessageClient: an empty callback");
+  binding_ = std::make_shared<Binding>(dispatcher_->parts(), std::move(callback));
   // Allocated here, because the command may run on another thread, where no caller can handle
   // std::bad_alloc.
   const auto place = std::make_shared<BindingRounds::Place>(binding_);

@@ -40,7 +40,7 @@ void RunnerLock::endOtherBias() {
     const std::lock_guard lock(mutex_);
     owner_.store(threadNumber(), std::memory_order_relaxed);
   }
-  released_.notify_all();
+  released_.get().notify_all();
 }
 
 void RunnerLock::releaseReal() noexcept {
@@ -54,7 +54,7 @@ void RunnerLock::releaseReal() noexcept {
     // PAIR(runner): as above.
     owner_.store(0, std::memory_order_release);
   }
-  released_.notify_all();
+  released_.get().notify_all();
 }
 
 bool RunnerLock::hasOtherRunner() {
@@ -75,7 +75,7 @@ void RunnerLock::waitForTemporaryOwner() {
     if (tryTake(threadNumber())) return;
     const auto owner = owner_.load(std::memory_order_relaxed);
     if (owner != 0 && (owner & kTemporary) == 0) throwOtherRunner();
-    if (owner != 0) released_.wait(lock);
+    if (owner != 0) released_.get().wait(lock);
   }
 }
 

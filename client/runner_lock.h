@@ -15,12 +15,12 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 
 #include "base/bias.h"
+#include "shm/process_condition.h"
 
 namespace mpf {
 
@@ -107,7 +107,7 @@ class RunnerLock {
   std::atomic<int> waitingRunners_{0};  // threads that wait in acquire()
   std::atomic<std::uint64_t> lastRunner_{0};  // its threadNumber(); written under mutex_
   std::mutex mutex_;
-  std::condition_variable released_;  // by a temporary owner
+  ProcessCondition released_;  // by a temporary owner
   std::weak_ptr<void> lastRunnerAlive_;  // under mutex_; expires when that thread ends
 };
 

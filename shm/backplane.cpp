@@ -3,13 +3,13 @@
 
 #include <cstdlib>
 #include <fmt/format.h>
-#include <mutex>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "base/number.h"
 #include "base/step.h"
+#include "shm/per_process.h"
 #include "shm/segment.h"
 #include "shm/segment_name.h"
 #include "shm/stale_segments.h"
@@ -18,19 +18,11 @@
 namespace mpf {
 
 struct Backplane::State {
-  explicit State(std::string itsName) : name(std::move(itsName)) {}
-  // After a fork the child uses this handle with a new watcher. The parent's watcher has no thread
-  // in the child; its copy is released, not destroyed.
-  Watcher& itsWatcher() {
-    const std::lock_guard lock(mutex);
-    // NOLINTNEXTLINE(bugprone-unused-return-value)
-    if (watcher->isInherited())
-      static_cast<void>(std::exchange(watcher, std::make_unique<Watcher>(name)).release());
-    return *watcher;
+  explicit State(std::string itsName) : name(std::move(itsName)) {
+    static_cast<void>(watcher.get(name));  // here, where the caller expects errors
   }
   std::string name;
-  std::mutex mutex;
-  std::unique_ptr<Watcher> watcher = std::make_unique<Watcher>(name);
+  PerProcess<Watcher> watcher;  // the parent's watcher has no thread in the child of a fork
 };
 
 namespace {
@@ -76,7 +68,7 @@ Backplane Backplane::isolated() {
 }
 
 const std::string& Backplane::name() const noexcept { return state_->name; }
-Watcher& Backplane::watcher() const noexcept { return state_->itsWatcher(); }
+Watcher& Backplane::watcher() const noexcept { return state_->watcher.get(state_->name); }
 
 std::int32_t Backplane::defaultLocation() {
   const auto text = environmentOr("MPF_LOCATION", "0");

@@ -70,10 +70,11 @@ class MessageClient {
   using Callback = std::function<void(Message&&)>;
 
   // Callbacks run on the thread of the shared dispatcher of the backplane.
-  //   throws  as Dispatcher::shared()
+  //   throws  as Dispatcher::shared(); std::invalid_argument when `callback` is empty
   MessageClient(const Backplane& backplane, Callback callback);
   // Callbacks run on the thread that runs `dispatcher`, which must outlive the client.
-  //   throws  std::bad_alloc; bind() allocates the memory of the connection
+  //   throws  std::invalid_argument when `callback` is empty, std::logic_error when `dispatcher`
+  //           was made before a fork, std::bad_alloc; bind() allocates the memory of the connection
   MessageClient(Dispatcher& dispatcher, Callback callback);
   // No callback runs after the destructor has returned. Unless it is called on the thread that runs
   // the dispatcher, it waits until the callback in progress, of any client of the dispatcher, has

@@ -4,10 +4,12 @@
 #include <fcntl.h>
 #include <pthread.h>
 
+#include <atomic>
 #include <cerrno>
 #include <dlfcn.h>
 #include <functional>
 #include <system_error>
+#include <thread>
 
 #include "tests/client/client_fixture.h"
 #include "tests/support/sanitized.h"
@@ -16,11 +18,17 @@ namespace {
 
 int reserving = 0;  // what the kernel answers; 0: it reserves memory
 int startingThread = 0;  // likewise
+std::atomic<bool> blocks{false};  // the next reservation waits until this is false again
+std::atomic<bool> isBlocked{false};
 
 }  // namespace
 
 extern "C" int posix_fallocate(int fd, off_t offset, off_t bytes) noexcept(false) {
   if (reserving != 0) return reserving;
+  if (blocks && !isBlocked.exchange(true)) {
+    isBlocked.notify_one();
+    blocks.wait(true);
+  }
   return ::fallocate(fd, 0, offset, bytes) == 0 ? 0 : errno;
 }
 
@@ -90,6 +98,36 @@ TEST(Constructors, ReportThatNoThreadCanBeStarted) {
   MessageClient client(backplane, [](const Message&) {});
   client.bind("device");
   while (!client.isConnected()) server.handleOne();
+}
+
+// No other thread of the parent exists in the child.
+TEST(Constructors, MakeASharedDispatcherInTheChildOfAProcessThatMakesOne) {
+  MPF_NEEDS_A_CHILD;
+  const Watchdog watchdog("shared dispatcher of a child");
+  const TestBackplane backplane;
+  blocks = true;
+  std::thread parents([&] { const MessageClient client(backplane, [](const Message&) {}); });
+  isBlocked.wait(false);
+
+  const auto child = inAChild([&] {
+    ::alarm(60);
+    const MessageClient client(backplane, [](const Message&) {});
+  });
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  blocks = false;
+  blocks.notify_one();
+  parents.join();
+
+  EXPECT_EQ(status, 0);
+}
+
+TEST(Constructors, RefuseAnEmptyCallback) {
+  const TestBackplane backplane;
+  Dispatcher dispatcher(backplane);
+
+  EXPECT_THROW(MessageClient(dispatcher, {}), std::invalid_argument);
+  EXPECT_THROW(MessageClient(backplane, {}), std::invalid_argument);
 }
 
 }  // namespace

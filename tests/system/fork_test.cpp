@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -75,7 +76,10 @@ class ForkTest : public testing::Test {
 };
 
 TEST_F(ForkTest, InheritedObjectsRefuseUseInAChild) {
+  Dispatcher dispatcher(backplane_);
   const auto status = inChild([&] {
+    EXPECT_THROW(MessageClient(dispatcher, [](const Message&) {}), std::logic_error);
+    EXPECT_THROW(dispatcher.runOnce(), std::logic_error);
     EXPECT_FALSE(client_->isConnected());
     EXPECT_EQ(client_->send(Float64Message({.value = 1})), SendResult::notConnected);
     EXPECT_THAT(client_->notConnectedBecause(), testing::HasSubstr("made before a fork"));
@@ -103,6 +107,31 @@ TEST_F(ForkTest, AChildThatDestroysObjectsDoesNotChangeTheParents) {
   EXPECT_THAT(backplane_.segmentNames(), testing::UnorderedElementsAreArray(names));
   EXPECT_TRUE(client_->isConnected());
   expectAnswer(*sync_);
+}
+
+TEST_F(ForkTest, AChildMayDestroyAClientThatAThreadOfItsParentWaitsFor) {
+  auto dispatcher = std::make_unique<Dispatcher>(backplane_);
+  auto client = std::make_unique<MessageClient>(*dispatcher, [](const Message&) {});
+  client->bind("absent");
+  std::thread running([&] { dispatcher->run(); });
+  std::atomic<bool> isOver{false};
+  std::thread waiting([&] {
+    while (!isOver) static_cast<void>(client->connectWait(1s));
+  });
+
+  for (int i = 0; i < 20; ++i) {
+    const auto status = inChild([&] {
+      ::alarm(60);
+      client.reset();
+      dispatcher.reset();
+    });
+    EXPECT_EQ(status, 0);
+  }
+
+  isOver = true;
+  waiting.join();
+  dispatcher->interrupt();
+  running.join();
 }
 
 TEST_F(ForkTest, AChildCannotReplyToARequestOfItsParent) {
