@@ -68,6 +68,7 @@ void Binding::tryConnect() try {
   lacksResources_ = false;
   const auto server = connector_.tryFindServer();
   if (!server || !connector_.tryOpenLink(server, sender_)) return;
+  sentSeen_ = 0;
   setState(BindingState::connecting);
   connector_.askForAcceptance(channel().link(), *this);
   nudgeInterval_.start(Clock::nowNs());
@@ -173,7 +174,7 @@ void Binding::endAll() {
   deliverRemaining(channel.get());
   requests->forEach([&](Request& request) {
     const bool isUntaken =
-        ending != Ending::protocolError && !channel->link().outgoing().isTaken(request.ordinal);
+        ending != Ending::protocolError && !channel->link().outgoing().isTaken(request.ordinal());
     if (isUntaken && !hasLeft() && sender_.tryKeep(request)) return;
     deliverFate(request, isUntaken ? Fate::neverTaken : Fate::outcomeUnknown);
   });
@@ -200,7 +201,7 @@ void Binding::lookForServer(Ending ending) {
 
 void Binding::cancel(std::uint32_t requestId) {
   if (!sender_.requests()) return;
-  if (auto* request = sender_.requests()->find(requestId))
+  if (auto* request = sender_.requests()->find(requestId); request != nullptr && isSent(*request))
     return deliverFate(*request, Fate::cancelled);
   const auto isIt = [requestId](const UntakenRequest& request) { return request.id == requestId; };
   if (const auto request = sender_.takeUntaken(isIt)) deliverFate(*request, Fate::cancelled);

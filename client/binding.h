@@ -158,6 +158,15 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   template <class Run, class Accept>
   void takeRun(Run& run, std::size_t most, const Accept& accept) noexcept;
   bool tryEndRequest(const EnvelopeWords& reply) noexcept;
+  // Whether a request of the table was sent. Another thread may have added it and not sent it yet,
+  // and take it back when the queue is full: then a reply to it is forged.
+  [[nodiscard, gnu::always_inline]] bool isSent(const Request& request) noexcept {
+    const auto ordinal = request.ordinal();
+    if (ordinal > sentSeen_) [[likely]]
+      sentSeen_ = channel().link().outgoing().countedMessages();
+    return ordinal <= sentSeen_ || isSentAtLast(request);
+  }
+  [[nodiscard]] bool isSentAtLast(const Request& request) noexcept;
   // Whether a request is pending: it has had neither a reply nor a fate.
   [[nodiscard]] bool isAwaited(std::uint32_t requestId) noexcept {
     const auto* const request = sender_.requests()->find(requestId);
@@ -190,6 +199,7 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
   RunReceiver* runs_ = nullptr;  // likewise; nullptr: all replies are delivered one by one
   // Messages of a run, without its first one, that takeSome() has still to count.
   int takenBehind_ = 0;
+  std::uint64_t sentSeen_ = 0;  // messages that were sent on the link, when isSent() looked last
   End end_;  // in the states ending and interrupted, and at the end in the state left
 };
 

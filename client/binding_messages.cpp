@@ -19,8 +19,11 @@ constexpr bool isControl(MessageType type) noexcept {
 // A server may send a ConnectMessage only to report a full queue behind it (a router does), not as
 // a reply; and a fate only as the reply to the request that it names.
 bool mayServerSend(const Message& message, const Request* request) noexcept {
-  if (const auto* connect = message.tryAs<Connect>())
-    return request == nullptr && connect->status == ConnectStatus::connectQueueFull;
+  if (message.getType() == MessageType::connect) {
+    const auto* connect = message.tryAs<Connect>();
+    return connect != nullptr && request == nullptr &&
+           connect->status == ConnectStatus::connectQueueFull;
+  }
   if (message.getType() != MessageType::requestFate) return true;
   const auto* fate = message.tryAs<RequestFate>();
   return fate != nullptr && request != nullptr &&
@@ -78,6 +81,7 @@ void Binding::deliverRemaining(const MessageLink* ended) {
       dropReply(envelope.body(), request);
       return true;
     }
+    if (!isSent(*request)) return false;
   } else if (runs_ != nullptr && isAwaited(envelope.requestId)) {
     // The other router would treat this reply as a protocol error of this router.
     return false;
@@ -106,6 +110,16 @@ bool Binding::tryTakeLong(BodyFields fields, RequestMarks marks, Times times, Re
       break;
   }
   return tryDeliver(std::move(message), times.sentTick, request);
+}
+
+// The number of messages did not include the request: waits until the thread that has the lock has
+// sent it or taken it back.
+[[gnu::noinline]] bool Binding::isSentAtLast(const Request& request) noexcept {
+  const auto id = request.id.load(std::memory_order_relaxed);
+  const BiasedLock::Guard lock(*sender_.lock());
+  sentSeen_ = channel().link().outgoing().messages();
+  return id != 0 && request.id.load(std::memory_order_relaxed) == id &&
+         request.ordinal() <= sentSeen_;
 }
 
 // A reply to a request that has had its fate.
@@ -250,7 +264,7 @@ void Binding::takeRun(Run& run, std::size_t most, const Accept& accept) noexcept
 // Ends the request of a first reply that is taken in a run. Returns false if it is not pending.
 bool Binding::tryEndRequest(const EnvelopeWords& reply) noexcept {
   auto* const request = sender_.requests()->find(reply.requestId());
-  if (request == nullptr || request->isGivenUp) return false;
+  if (request == nullptr || request->isGivenUp || !isSent(*request)) return false;
   if (reply.sentTick() != 0 || request->sentNs != 0) noteTimes(reply.sentTick(), request);
   // Ended before the next message is looked at, which may name the same request.
   endRequest(*request);

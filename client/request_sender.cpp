@@ -79,7 +79,7 @@ SendResult RequestSender::tryGrow() noexcept {
   }
   request->clientType = message.getClientType();
   request->clientExtra = message.getClientExtra();
-  request->ordinal = link.outgoing().messages() + 1;
+  request->setOrdinal(link.outgoing().messages() + 1);
   request->deadlineNs = deadlineNs;
   request->sentNs = sentNs;
   if (copy != nullptr) request->copy = std::move(*copy);
@@ -253,7 +253,7 @@ std::size_t RequestSender::sendRunLocked(const Bodies& bodies, std::int64_t dead
     auto& request = *requests_->tryReserve(id);
     request.clientType = 0;
     request.clientExtra = 0;
-    request.ordinal = link.outgoing().messages() + 1;
+    request.setOrdinal(link.outgoing().messages() + 1);
     request.deadlineNs = deadlineNs;
     request.sentNs = sentNs;
     requests_->add(request, id);
@@ -284,7 +284,7 @@ std::size_t RequestSender::sendRunLocked(const MessageRun& run) noexcept {
     if (request == nullptr) break;
     request->clientType = run[count].clientType();
     request->clientExtra = run[count].clientExtra();
-    request->ordinal = link.outgoing().messages() + 1 + count;
+    request->setOrdinal(link.outgoing().messages() + 1 + count);
     request->deadlineNs = 0;
     request->sentNs = 0;
     requests_->add(*request, id);
@@ -383,7 +383,7 @@ std::uint32_t RequestSender::findExpired(std::uint32_t& at, std::int64_t nowNs,
     if (request->deadlineNs == 0 || request->isGivenUp) continue;
     if (request->deadlineNs > nowNs) {
       nextNs = std::min(nextNs, request->deadlineNs);
-    } else if (!channel_->link().outgoing().isTaken(request->ordinal)) {
+    } else if (!channel_->link().outgoing().isTaken(request->ordinal())) {
       return request->id.load(std::memory_order_relaxed);
     }
   }

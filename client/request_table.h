@@ -26,10 +26,20 @@ struct Request {
   std::int32_t clientType = 0;
   std::int32_t clientExtra = 0;
   bool isGivenUp = false;  // used by the dispatcher's thread only
-  std::uint64_t ordinal = 0;  // number of its message on the link
   std::int64_t deadlineNs = 0;
   std::int64_t sentNs = 0;  // of a timed request; else 0
   std::unique_ptr<Message> copy{};  // to be sent again if no server takes the request; else null
+
+  // The number of its message on the link.
+  [[nodiscard]] std::uint64_t ordinal() const noexcept {
+    return ordinal_.load(std::memory_order_relaxed);
+  }
+  void setOrdinal(std::uint64_t ordinal) noexcept {
+    ordinal_.store(ordinal, std::memory_order_relaxed);
+  }
+
+ private:
+  std::atomic<std::uint64_t> ordinal_{0};
 };
 
 class RequestTable {

@@ -112,11 +112,12 @@ class RingProducer {
       words(index).copyTo(message);
       detail::copyWords<layout::kFirstSlotBodyBytes>(message.body.data(), bodies);
       bodies += layout::kFirstSlotBodyBytes;
+      const auto messages = countMessage();
       MPF_STEP(slot_written);
       // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
       message.sequence.store(++position, std::memory_order_release);
       MPF_STEP(slot_published);
-      pushed(++messages_);
+      pushed(messages);
     }
     if (count == 1) offer(slot(pushed_), reserve);
     pushed_ = position;
@@ -133,6 +134,11 @@ class RingProducer {
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
+  // The same, for any thread. A message is counted before the consumer sees it.
+  [[nodiscard]] std::uint64_t countedMessages() noexcept {
+    // PAIR(message-counted): sees what the thread that pushes did before.
+    return std::atomic_ref(messages_).load(std::memory_order_acquire);
+  }
   // Messages that the consumer has not taken, never more than were pushed.
   [[nodiscard]] std::uint64_t waiting() noexcept {
     // PAIR(message-taken): the consumer counts a message before it looks at it.
@@ -210,11 +216,17 @@ class RingProducer {
     MPF_STEP(slot_written);
     const auto sequence = pushed_ + 1;
     pushed_ += slots;
-    ++messages_;
+    countMessage();
     // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
     first.sequence.store(sequence, std::memory_order_release);
     MPF_STEP(slot_published);
     next_.store(&slot(pushed_), std::memory_order_relaxed);
+  }
+  std::uint64_t countMessage() noexcept {
+    const auto messages = messages_ + 1;
+    // PAIR(message-counted): a thread that sees the number sees what was done before.
+    std::atomic_ref(messages_).store(messages, std::memory_order_release);
+    return messages;
   }
   // Sends the line of a single message towards the processor that polls for it. A message with a
   // reserve is one of a stream. Its receiver is behind, so this would only cost time.
@@ -250,7 +262,7 @@ class RingProducer {
   bool isPolledElsewhere_ = false;  // at the last claim
   std::uint64_t judged_ = 0;  // messages at the last call of isOneByOne()
   std::uint64_t idleSeen_ = 0;  // timesIdle() then
-  std::uint64_t messages_ = 0;
+  std::uint64_t messages_ = 0;  // stored and read by other threads atomically
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
 };
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What constructors throw when memory or threads are exhausted. This file replaces system calls
-// with functions that fail.
+// What happens when memory or threads are exhausted. This file replaces system calls with functions
+// that fail or wait.
 #include <fcntl.h>
 #include <pthread.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <dlfcn.h>
@@ -11,24 +12,35 @@
 #include <system_error>
 #include <thread>
 
+#include "server/connection.h"
 #include "tests/client/client_fixture.h"
+#include "tests/support/replaced_yield.h"
 #include "tests/support/sanitized.h"
 
 namespace {
 
-int reserving = 0;  // what the kernel answers; 0: it reserves memory
+std::atomic<int> reserving = 0;  // what the kernel answers; 0: it reserves memory
 int startingThread = 0;  // likewise
 std::atomic<bool> blocks{false};  // the next reservation waits until this is false again
 std::atomic<bool> isBlocked{false};
 
+void block() {
+  isBlocked = false;
+  blocks = true;
+}
+void unblock() {
+  blocks = false;
+  blocks.notify_one();
+}
+
 }  // namespace
 
 extern "C" int posix_fallocate(int fd, off_t offset, off_t bytes) noexcept(false) {
-  if (reserving != 0) return reserving;
   if (blocks && !isBlocked.exchange(true)) {
     isBlocked.notify_one();
     blocks.wait(true);
   }
+  if (reserving != 0) return reserving;
   return ::fallocate(fd, 0, offset, bytes) == 0 ? 0 : errno;
 }
 
@@ -105,7 +117,7 @@ TEST(Constructors, MakeASharedDispatcherInTheChildOfAProcessThatMakesOne) {
   MPF_NEEDS_A_CHILD;
   const Watchdog watchdog("shared dispatcher of a child");
   const TestBackplane backplane;
-  blocks = true;
+  block();
   std::thread parents([&] { const MessageClient client(backplane, [](const Message&) {}); });
   isBlocked.wait(false);
 
@@ -115,11 +127,50 @@ TEST(Constructors, MakeASharedDispatcherInTheChildOfAProcessThatMakesOne) {
   });
   int status = 0;
   ::waitpid(child, &status, 0);
-  blocks = false;
-  blocks.notify_one();
+  unblock();
   parents.join();
 
   EXPECT_EQ(status, 0);
+}
+
+// A server forges the reply to a request that its client is about to send, and takes back then,
+// because there is no memory for it.
+TEST_F(ClientTest, AReplyToARequestThatWasNotSentIsAProtocolError) {
+  auto& server = startServer();
+  auto held = heldRequest();
+  const auto& connection = Connection::of(held.route());
+  const auto next = held.route().requestId + 1;
+  ASSERT_EQ(server.reply(std::move(held)), ReplyResult::sent);
+  EXPECT_NE(this->next().tryAs<Int32>(), nullptr);
+  block();
+  std::thread sending([&] {
+    EXPECT_EQ(client_.send(Float64ArrayMessage::allocValue(kBeyondRings), Deadline::never(),
+                           nullptr, Retry::neverTaken),
+              SendResult::noMemory);
+  });
+  isBlocked.wait(false);
+  const Envelope forged{.type = static_cast<std::uint16_t>(MessageType::int32),
+                        .flags = layout::kSlotFirstReply,
+                        .requestId = next};
+  const std::array<std::byte, layout::kFirstSlotBodyBytes> body{};
+  {
+    const BiasedLock::Guard lock(*connection.lock);
+    ASSERT_EQ(connection.channel->link().trySend(forged, body, {0, 0}), LinkSend::sent);
+  }
+  {
+    const ReplacedYield whileItWaits([] {
+      reserving = ENOSPC;
+      unblock();
+    });
+    while (news_.size() == 1 && messages_.empty()) dispatcher_.runOnce();
+  }
+  unblock();
+  sending.join();
+  reserving = 0;
+
+  EXPECT_THAT(messages_, testing::IsEmpty());
+  EXPECT_EQ(sumOf(&layout::WindowControl::protocolErrors), 1u);
+  messages_.clear();
 }
 
 TEST(Constructors, RefuseAnEmptyCallback) {
