@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A server that sends messages that only MPF may send: its client ends the connection.
+#include <array>
+
 #include "tests/client/client_fixture.h"
 
 namespace mpf::test {
@@ -25,6 +27,18 @@ TEST_F(ProtocolErrorTest, AServerMustNotSendConnectMessages) {
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<Connect>(request);
     lie->status = ConnectStatus::connectNo;
+    static_cast<void>(server.reply(std::move(lie)));
+  });
+
+  expectToBeLeft();
+}
+
+// Whatever is in it.
+TEST_F(ProtocolErrorTest, AServerMustNotSendConnectMessagesThatAreTooShort) {
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) {
+    auto lie = Message::copyOf(MessageType::connect, std::array{std::byte{1}});
+    lie.setRoute(request.route());
     static_cast<void>(server.reply(std::move(lie)));
   });
 
