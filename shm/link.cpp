@@ -129,13 +129,15 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   control.clientState.store(layout::LinkState::open, std::memory_order_relaxed);
   control.requestWatch.store(layout::Watch::unwatched, std::memory_order_relaxed);
   control.replyWatch.store(layout::Watch::unwatched, std::memory_order_relaxed);
-  const auto name = SegmentName::link(backplane, offer.incarnation, header.incarnation);
-  if (!segment.tryPublish(name))
-    throw SegmentError(fmt::format("{}: duplicate incarnation number", segments::path(name)));
-  MPF_STEP(link_named);
-  segment.closeFile();
+  segment.completeHeader();
   auto link =
       std::unique_ptr<Link>(new Link(std::move(segment), backplane, LinkSide::client, rights));
+  // Last, because nothing may fail after the file has its name.
+  const auto name = SegmentName::link(backplane, offer.incarnation, header.incarnation);
+  if (!link->segment_.tryPublish(name))
+    throw SegmentError(fmt::format("{}: duplicate incarnation number", segments::path(name)));
+  MPF_STEP(link_named);
+  link->segment_.closeFile();
   link->attachPeer(std::move(server), 0);
   return link;
 }
@@ -365,11 +367,9 @@ void Link::release(const std::byte* data) noexcept {
 
 std::optional<Chunk> Link::tryBorrowOther(layout::ChunkRef ref) try {
   std::optional<Chunk> chunk;
-  if (ref.side == layout::kFanOutSide && side_ == LinkSide::client) {
+  if (ref.side == layout::kFanOutSide && side_ == LinkSide::client)
     chunk = fanOut_.tryBorrow({ref.segment, ref.chunk}, ref.missed);
-  } else if (ref.side == peerSide()) {
-    chunk = borrowed_.tryBorrow({ref.segment, ref.chunk});
-  }
+  else if (ref.side == peerSide()) chunk = borrowed_.tryBorrow({ref.segment, ref.chunk});
   if (!chunk && hasPeerEnded()) throw ChunkUnavailable();
   return chunk;
 } catch (const std::exception&) {  // ChunkUnavailable from above, no descriptor, or no memory

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "shm/peer_windows.h"
 
+#include <exception>
 #include <utility>
 
 #include "shm/stale_segments.h"
@@ -27,7 +28,11 @@ std::shared_ptr<PeerWindow> PeerWindows::tryOpen(const std::string& name,
   auto window = PeerWindow::tryOpen(name, kind);
   if (!window || window->isClosed() || !window->isLocked()) return nullptr;
   const auto clean = [this, name, incarnation = window->header().incarnation] {
-    stale_segments::removeDeadWindow(backplane_.name(), name, incarnation);
+    try {
+      stale_segments::removeDeadWindow(backplane_.name(), name, incarnation);
+      // NOLINTNEXTLINE(bugprone-empty-catch): no memory: others remove the files
+    } catch (const std::exception&) {
+    }
     onDeath_();
   };
   auto& peer = peers_.emplace(name, Peer{window})->second;

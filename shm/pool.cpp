@@ -142,11 +142,14 @@ void PoolBorrower::returnPacked(std::uint32_t packed) noexcept {
   MPF_STEP(chunk_returned);
 }
 
-void removeBulk(std::string_view backplane, std::uint64_t link) {
+void removeBulk(std::string_view backplane, std::uint64_t link) noexcept {
   for (std::uint32_t side = 0; side < 2; ++side) {
+    const auto name = [&](std::uint32_t number) {
+      return SegmentName::bulkText(backplane, link, side, number);
+    };
     std::uint32_t count = 0;
-    while (segments::exists(SegmentName::bulk(backplane, link, side, count))) ++count;
-    while (count != 0) segments::remove(SegmentName::bulk(backplane, link, side, --count));
+    while (segments::exists(name(count).data())) ++count;
+    while (count != 0) segments::remove(name(--count).data());
   }
 }
 

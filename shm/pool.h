@@ -211,6 +211,6 @@ class PoolBorrower {
 // Removes the bulk segments of both sides of a link. Removes the last ones first, as their owner
 // does: a process that is killed in between leaves no gap in the numbers. Segments after a gap
 // would not be found.
-void removeBulk(std::string_view backplane, std::uint64_t link);
+void removeBulk(std::string_view backplane, std::uint64_t link) noexcept;
 
 }  // namespace mpf

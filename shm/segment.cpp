@@ -3,11 +3,13 @@
 
 #include <dirent.h>
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/random.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <boost/interprocess/shared_memory_object.hpp>
+#include <array>
 #include <cstring>
 #include <fmt/format.h>
 #include <memory>
@@ -22,8 +24,6 @@
 
 namespace mpf {
 namespace {
-
-namespace ipc = boost::interprocess;
 
 constexpr const char* kDirectory = "/dev/shm";
 
@@ -196,13 +196,14 @@ void Segment::lockForLife() {
 }
 
 bool Segment::tryPublish(const std::string& name) {
-  header_ = sharedHeader();  // copied before a peer can write to it
+  completeHeader();
+  auto ownName = name;  // here, because nothing may fail after the file has its name
   MPF_STEP(segment_complete);
   const auto self = fmt::format("/proc/self/fd/{}", file_.get());
   if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, segments::path(name).c_str(), AT_SYMLINK_FOLLOW) ==
       0) {
     MPF_STEP(segment_named);
-    name_ = name;
+    name_ = std::move(ownName);
     return true;
   }
   if (errno == EEXIST) return false;
@@ -249,13 +250,17 @@ namespace segments {
 
 std::string path(const std::string& name) { return fmt::format("{}/{}", kDirectory, name); }
 
-bool remove(const std::string& name) {
-  const bool removed = ipc::shared_memory_object::remove(name.c_str());
+bool remove(const char* name) noexcept {
+  const bool removed = ::shm_unlink(name) == 0;
   MPF_STEP(name_removed);
   return removed;
 }
 
-bool exists(const std::string& name) { return ::access(path(name).c_str(), F_OK) == 0; }
+bool exists(const char* name) noexcept {
+  std::array<char, 512> file{};
+  fmt::format_to_n(file.data(), file.size() - 1, "{}/{}", kDirectory, name);
+  return ::access(file.data(), F_OK) == 0;
+}
 
 void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind,
            const std::string& path) {

@@ -64,7 +64,9 @@ class Segment {
   // Holds the owner's lock until this object is destroyed or the process ends. If a peer truncates
   // the file, the guard grows it again.
   void lockForLife();
-  // Gives the file its name. Returns false if another file has this name.
+  // Before tryPublish(), for users of header(): the fields of sharedHeader() are filled in.
+  void completeHeader() { header_ = sharedHeader(); }
+  // Completes the header, and gives the file its name. Returns false if another file has this name.
   [[nodiscard]] bool tryPublish(const std::string& name);
 
   // Maps an existing segment; nullopt if no file has this name.
@@ -118,8 +120,11 @@ class Segment {
 namespace segments {
 
 // Removes the name. Returns false if there was no such name, or this user may not remove it.
-bool remove(const std::string& name);
-[[nodiscard]] bool exists(const std::string& name);
+// Needs no memory.
+bool remove(const char* name) noexcept;
+inline bool remove(const std::string& name) noexcept { return remove(name.c_str()); }
+[[nodiscard]] bool exists(const char* name) noexcept;
+[[nodiscard]] inline bool exists(const std::string& name) noexcept { return exists(name.c_str()); }
 
 // Copies the header and checks it as Segment::tryOpen does, without mapping the file; nullopt if no
 // file has this name.

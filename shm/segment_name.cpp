@@ -108,7 +108,15 @@ std::string SegmentName::link(std::string_view backplane, std::uint64_t serverWi
 
 std::string SegmentName::bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side,
                               std::uint32_t segment) {
-  return fmt::format("mpf.{}.b.{:x}.{}.{}", backplane, link, side, segment);
+  return bulkText(backplane, link, side, segment).data();
+}
+
+SegmentName::Text SegmentName::bulkText(std::string_view backplane, std::uint64_t link,
+                                        std::uint32_t side, std::uint32_t segment) noexcept {
+  Text text{};
+  fmt::format_to_n(text.data(), text.size() - 1, "mpf.{}.b.{:x}.{}.{}", backplane, link, side,
+                   segment);
+  return text;
 }
 
 std::string SegmentName::fanOutPrefix(std::string_view backplane, std::uint64_t serverWindow) {

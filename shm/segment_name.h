@@ -2,6 +2,7 @@
 // SegmentName: builds and parses the names of segments in /dev/shm. layout.h lists them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -38,6 +39,10 @@ struct SegmentName {
                           std::uint64_t link);
   static std::string bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side,
                           std::uint32_t segment);
+  // As bulk(), for functions that must not fail: a text that ends with 0, and needs no memory.
+  using Text = std::array<char, 256>;
+  static Text bulkText(std::string_view backplane, std::uint64_t link, std::uint32_t side,
+                       std::uint32_t segment) noexcept;
 
   static std::string fanOut(std::string_view backplane, std::uint64_t serverWindow,
                             std::uint32_t segment);

@@ -9,7 +9,8 @@
 
 #include <array>
 #include <cstring>
-#include <system_error>
+#include <exception>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -34,7 +35,7 @@ void closeElsewhere(FileDescriptor names) noexcept try {
   const SignalsBlocked blocked;
   std::thread([closing = std::move(names)] {}).detach();
   // NOLINTNEXTLINE(bugprone-empty-catch): no thread could be started: closed here
-} catch (const std::system_error&) {
+} catch (const std::exception&) {
 }
 
 bool tryAdd(int epoll, int fd, Watcher::Token token) noexcept {
@@ -180,9 +181,20 @@ void Watcher::run() {
       const auto token = events[static_cast<std::size_t>(i)].data.u64;
       if (token == kStop) return;
       const std::lock_guard lock(mutex_);
-      handle(token);
+      try {
+        handle(token);
+      } catch (const std::bad_alloc&) {
+        retry();
+      }
     }
   }
+}
+
+// The timer, which may not run, calls poll() once more.
+void Watcher::retry() noexcept {
+  const itimerspec spec{.it_interval = timespecOf(kPollNs), .it_value = timespecOf(kPollNs)};
+  ::timerfd_settime(timer_.get(), 0, &spec, nullptr);
+  polls_ = true;
 }
 
 void Watcher::handle(Token token) {
@@ -216,11 +228,13 @@ void Watcher::readNames() {
   alignas(inotify_event) std::array<char, 4096> events;
   const auto got = ::read(names_.get(), events.data(), events.size());
   if (got <= 0) return;
+  areNamesLost_ = true;
   const auto kinds = kindsIn(events.data(), static_cast<std::size_t>(got), backplane_);
   const bool someLost = kinds.find('*') != std::string::npos;
   notifyNames([&](NameKind kind) {
     return someLost || kinds.find(static_cast<char>(kind)) != std::string::npos;
   });
+  areNamesLost_ = false;
 }
 
 void Watcher::notifyNames(const std::function<bool(NameKind)>& isNew) {
@@ -240,7 +254,9 @@ void Watcher::poll() {
   for (const auto token : gone) {
     if (peers_.contains(token)) report(token);
   }
-  if (!names_) notifyNames([](NameKind) { return true; });
+  if (!names_ || areNamesLost_) notifyNames([](NameKind) { return true; });
+  areNamesLost_ = false;
+  updateTimer();
 }
 
 void Watcher::pollAtOnce() {

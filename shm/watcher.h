@@ -9,6 +9,7 @@
 // Crash    as long as a peer has no pidfd here (before watchProcess(), another pid namespace, a
 //          reused pid, no free descriptor), the watcher asks for its owner every 100 ms. Likewise,
 //          it calls the callbacks for names every 100 ms if the user has no free inotify instance.
+//          What it could not report for lack of memory, it reports up to 100 ms later.
 // Trust    the pid of a window is from a header that its owner alone writes. Without a pidfd, the
 //          kernel's lock is the proof.
 #pragma once
@@ -67,6 +68,7 @@ class Watcher {
   void report(Token token);
   void openNames();
   void readNames();
+  void retry() noexcept;
   struct Names {
     NameKind kind;
     Callback callback;
@@ -82,6 +84,7 @@ class Watcher {
   FileDescriptor stop_;
   FileDescriptor timer_;
   FileDescriptor names_;  // inotify, while a caller waits for names; empty: polled
+  bool areNamesLost_ = false;  // names that were read have not been reported
   std::recursive_mutex mutex_;  // callbacks run under it, which makes the promise of forget() true
   Token next_ = 16;  // lower tokens: the watcher's own descriptors
   std::map<Token, Peer> peers_;

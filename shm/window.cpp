@@ -112,7 +112,7 @@ Rights joined(const Rights& now, Rights added) {
 OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
                      const std::string& name, Rights rights,
                      const std::function<void(layout::SegmentHeader&)>& describe)
-    : backplane_(backplane), rights_(rights), admitted_(rights) {
+    : rights_(rights), admitted_(rights) {
   window_ = Segment::create(layout::kWindowBytes, kind, backplane,
                             {rights.mode & kReadableByAll.mode, rights.group});
   window_.lockForLife();
@@ -130,17 +130,18 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
       Segment::create(sizeof(layout::WindowHints), layout::SegmentKind::hints, backplane, rights);
   hints_.lockForLife();
   hints_.sharedHeader().ownerWindow = incarnation;
+  // Built before, because nothing may fail between the creation of a file and the `try`.
   const auto hintsName = SegmentName::keyed(backplane, NameKind::hints, incarnation);
+  fifoName_ = SegmentName::keyed(backplane, NameKind::fifo, incarnation);
   if (!hints_.tryPublish(hintsName))
     throw NameInUse(fmt::format("{}: duplicate incarnation number", segments::path(hintsName)));
-  const auto fifo = SegmentName::keyed(backplane, NameKind::fifo, incarnation);
   try {
-    fifo_ = doorbell::createFifo(fifo, pipeMode(rights.mode), rights.group);
+    fifo_ = doorbell::createFifo(fifoName_, pipeMode(rights.mode), rights.group);
     MPF_STEP(window_complete);
     publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation)
                          : name);
   } catch (...) {
-    segments::remove(fifo);
+    segments::remove(fifoName_);
     segments::remove(hints_.name());
     throw;
   }
@@ -165,7 +166,7 @@ OwnWindow::~OwnWindow() {
   // PAIR(window-closed): the owner has closed its links before.
   control().state.store(layout::WindowState::closed, std::memory_order_release);
   MPF_STEP(window_closed);
-  segments::remove(SegmentName::keyed(backplane_, NameKind::fifo, header().incarnation));
+  segments::remove(fifoName_);
   segments::remove(hints_.name());
   segments::remove(window_.name());
 }

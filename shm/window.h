@@ -67,11 +67,11 @@ class OwnWindow {
  private:
   void publish(const std::string& name);
   ForkGuard forkGuard_;
-  std::string backplane_;
   Rights rights_;
   Rights admitted_;  // of the hints
   Segment window_;
   Segment hints_;
+  std::string fifoName_;
   FileDescriptor fifo_;
 };
 
