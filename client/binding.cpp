@@ -143,11 +143,11 @@ bool Binding::hasDeadPeer() const noexcept {
   return isLinked() && channel().link().peer()->isDead();
 }
 
-void Binding::disconnect(const std::string& reason, Ending ending) {
+void Binding::disconnect(std::string_view reason, Ending ending) {
   connector_.setReason(reason);
   resume();
-  end_ = {ending, isConnected(),
-          ending == Ending::serverGone ? channel().link().geometry().allReplySlots() : 0};
+  const bool deliversRest = ending == Ending::serverGone && !hasLeft();
+  end_ = {ending, isConnected(), deliversRest ? channel().link().geometry().allReplySlots() : 0};
   if (!hasLeft()) setState(BindingState::ending);
   MPF_STEP(disconnecting);
   resumeEnd();

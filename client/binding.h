@@ -15,6 +15,7 @@
 #include <atomic>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <mpf/message_client.h>
 
@@ -86,13 +87,15 @@ class Binding final : public LinkUser, public std::enable_shared_from_this<Bindi
     // The client ends the connection: the server may still receive requests for a while.
     protocolError,
   };
-  void disconnect(const std::string& reason, Ending ending);
+  void disconnect(std::string_view reason, Ending ending);
   void cancel(std::uint32_t requestId);
   // Between pause() and resume(), messages of the server stay in the link.
   void pause();
   void resume();
-  // Ends the connection. No callback runs after it.
+  // Ends the connection. No callback runs after it. Needs no memory.
   void leave();
+  // Connects in the next step. Any thread, after setServer().
+  void connectSoon() noexcept { timer_.wakeAt(Clock::nowNs()); }
   // Does what is due: ends expired requests, rings again for hints that may have been lost.
   void onTime(std::int64_t nowNs);
   [[nodiscard]] bool hasLeft() const noexcept { return state() == BindingState::left; }

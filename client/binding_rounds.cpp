@@ -72,12 +72,29 @@ std::vector<std::weak_ptr<Binding>> BindingRounds::takeDue(std::int64_t nowNs) {
 }
 
 void BindingRounds::resumeRounds() {
+  resumeDead();
+  resumeWaiting();
+  hasRounds_ = hasDeath_ || hasName_ || !dead_.isOver() || !waiting_.isOver();
+}
+
+void BindingRounds::resumeDead() {
+  if (dead_.isOver() && hasDeath_) {
+    dead_.begin(all());
+    hasDeath_ = false;
+  }
   dead_.resume([](Binding& binding) {
     if (!binding.hasDeadPeer()) return false;
     binding.disconnect("the process of the server exited", Binding::Ending::serverGone);
     return true;
   });
-  if (waiting_.isOver()) return;
+}
+
+void BindingRounds::resumeWaiting() {
+  if (waiting_.isOver()) {
+    if (!hasName_) return;
+    waiting_.begin(all());
+    hasName_ = false;
+  }
   waiting_.resume([](Binding& binding) {
     if (!binding.isWaiting()) return false;
     binding.tryConnect();

@@ -33,13 +33,15 @@ class BindingRounds {
   // No callback of a removed binding is in progress.
   void dropRemoved() noexcept;
 
-  // A process has died: disconnects the bindings whose server it was.
-  void beginDead() { dead_.begin(all()); }
-  // A server may have appeared: connects the bindings that wait for one.
-  void beginWaiting() { waiting_.begin(all()); }
-  // Continues these rounds. Returns true when one was in progress.
+  // A process has died: resume() disconnects the bindings whose server it was.
+  void noteDeath() noexcept { hasRounds_ = hasDeath_ = true; }
+  // A server may have appeared: resume() connects the bindings that wait for one.
+  void noteName() noexcept { hasRounds_ = hasName_ = true; }
+  // Begins and continues these rounds, each after the one before has ended. Returns false when it
+  // has found nothing to do.
+  //   throws  std::bad_alloc: the next call begins the round
   bool resume() {
-    if (dead_.isOver() && waiting_.isOver()) return false;
+    if (!hasRounds_) return false;
     resumeRounds();
     return true;
   }
@@ -57,12 +59,17 @@ class BindingRounds {
   [[nodiscard]] std::vector<std::weak_ptr<Binding>> takeDue(std::int64_t nowNs);
   void schedule(Member& member, std::int64_t dueNs);
   void resumeRounds();
+  void resumeDead();
+  void resumeWaiting();
 
   DispatcherParts& parts_;
   Members bindings_;
   std::set<std::pair<std::int64_t, const Binding*>> schedule_;
   bool isComplete_ = true;  // false: a binding may lack its place in schedule_
   Members removed_;
+  bool hasRounds_ = false;  // one of the two below, or a round of them, has not ended
+  bool hasDeath_ = false;  // since dead_ began
+  bool hasName_ = false;  // since waiting_ began
   Round<Binding> dead_;
   Round<Binding> waiting_;
   Round<Binding> due_;

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <ctime>
 #include <fmt/format.h>
+#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -60,9 +61,13 @@ std::string Connector::notConnectedBecause() const {
   return reason_;
 }
 
-void Connector::setReason(const std::string& reason) {
+void Connector::setReason(std::string_view reason) noexcept {
   const std::lock_guard lock(mutex_);
-  reason_ = reason;
+  try {
+    reason_ = reason;
+  } catch (const std::bad_alloc&) {
+    reason_ = "no memory";  // short enough to need none
+  }
 }
 
 void Connector::notifyConnected() {

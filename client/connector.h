@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 
 #include <mpf/clock.h>
 
@@ -54,7 +55,7 @@ class Connector {
   void cancelPendingBind();
   void retryLater() noexcept;
 
-  void setReason(const std::string& reason);
+  void setReason(std::string_view reason) noexcept;
   void notifyConnected();
   // Of the present or the last link.
   [[nodiscard]] std::uint32_t index() const noexcept { return index_; }

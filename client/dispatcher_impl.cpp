@@ -201,8 +201,8 @@ bool Dispatcher::Impl::runSome(int most) {
 bool Dispatcher::Impl::handleLocalHints() {
   const bool hasCalled = parts_.commands.hasCommands();
   if (hasCalled) parts_.commands.run();
-  if (endpoint().takePeerDeath()) bindings_.beginDead();
-  if (parts_.names.takeChange()) bindings_.beginWaiting();
+  if (endpoint().takePeerDeath()) bindings_.noteDeath();
+  if (parts_.names.takeChange()) bindings_.noteName();
   if (!parts_.commands.hasWaiting()) return hasCalled;
   hasPostponed_ = true;
   return true;

@@ -57,7 +57,9 @@ MessageClient::~MessageClient() {
 void MessageClient::bind(const std::string& server, std::int32_t location) {
   dispatcher_->endpoint().forkGuard().check("MessageClient");
   binding_->setServer(server, location);
-  dispatcher_->commands().runOrPost([binding = binding_] { binding->tryConnect(); });
+  // Neither way to connect needs memory: the client is bound now.
+  const auto connect = [binding = binding_.get()] { binding->tryConnect(); };
+  if (!dispatcher_->commands().tryRun(connect)) binding_->connectSoon();
 }
 
 void MessageClient::setValueHandler(

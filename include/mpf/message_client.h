@@ -88,7 +88,8 @@ class MessageClient {
   // connection fails, for example because /dev/shm is full, notConnectedBecause() returns the
   // reason and the client tries again.
   //   throws  std::invalid_argument when `server` is not a valid name, std::logic_error when the
-  //           client is already bound, and in the child of a fork
+  //           client is already bound, and in the child of a fork, std::bad_alloc; then the client
+  //           is not bound
   void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
 
   // Sets the callback for replies of type T whose body is valid. Call it once, before bind(). If T

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
-// This file replaces operator new with one that can fail.
 #include "client/binding_rounds.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <gtest/gtest.h>
 #include <memory>
 #include <new>
@@ -11,26 +9,9 @@
 
 #include <mpf/message_server.h>
 
+#include "shm/segment_name.h"
 #include "tests/client/binding_parts_fixture.h"
-
-namespace {
-
-constexpr int kUnlimited = -1;
-thread_local int allocationsLeft = kUnlimited;  // of this thread
-
-}  // namespace
-
-void* operator new(std::size_t bytes) {
-  if (allocationsLeft == 0) throw std::bad_alloc();
-  if (allocationsLeft != kUnlimited) --allocationsLeft;
-  if (auto* memory = std::malloc(std::max<std::size_t>(bytes, 1))) return memory;
-  throw std::bad_alloc();
-}
-void* operator new(std::size_t bytes, const std::nothrow_t& /*tag*/) noexcept {
-  return allocationsLeft == 0 ? nullptr : std::malloc(std::max<std::size_t>(bytes, 1));
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t /*bytes*/) noexcept { std::free(memory); }
+#include "tests/client/limited_memory.h"
 
 namespace mpf::test {
 namespace {
@@ -96,7 +77,7 @@ TEST_F(BindingRoundsTest, ConnectTheWaitingBindingsInSteps) {
   constexpr int kPerStep = Round<Binding>::kPerStep;
   const MessageServer server(backplane_, "dac");
   for (int i = 0; i < kPerStep + 1; ++i) add();
-  rounds_.beginWaiting();
+  rounds_.noteName();
 
   EXPECT_TRUE(rounds_.resume());
   EXPECT_EQ(waiting(), 1);
@@ -106,15 +87,55 @@ TEST_F(BindingRoundsTest, ConnectTheWaitingBindingsInSteps) {
   EXPECT_FALSE(rounds_.resume());
 }
 
+// A flood of names does not keep bindings from their turn.
+TEST_F(BindingRoundsTest, NamesThatAppearDuringARoundBeginTheNextOne) {
+  constexpr int kPerStep = Round<Binding>::kPerStep;
+  for (int i = 0; i < 3 * kPerStep; ++i) add();
+
+  for (int i = 0; i < 3; ++i) {
+    rounds_.noteName();
+    rounds_.resume();
+  }
+
+  const auto names = backplane_.segmentNames();
+  EXPECT_EQ(std::ranges::count_if(names,
+                                  [](const auto& name) {
+                                    return SegmentName::tryParse(name)->kind ==
+                                           NameKind::pendingBind;
+                                  }),
+            3 * kPerStep)
+      << "each binding has looked for its server";
+}
+
+TEST_F(BindingRoundsTest, ARoundThatFoundNoMemoryBeginsLater) {
+  const MessageServer server(backplane_, "dac");
+  add();
+  rounds_.noteDeath();
+  rounds_.noteName();
+  {
+    const LimitedMemory limit(0);
+    EXPECT_THROW(rounds_.resume(), std::bad_alloc);
+  }
+  {
+    const LimitedMemory limit(1);  // for the round of deaths
+    EXPECT_THROW(rounds_.resume(), std::bad_alloc);
+  }
+
+  EXPECT_TRUE(rounds_.resume());
+
+  EXPECT_EQ(waiting(), 0);
+  EXPECT_FALSE(rounds_.resume());
+}
+
 TEST_F(BindingRoundsTest, WatchNamesWhileABindingWaitsForItsServer) {
   const auto binding = add();
-  rounds_.beginWaiting();
+  rounds_.noteName();
   rounds_.resume();
   EXPECT_TRUE(binding->isWaiting());
   EXPECT_TRUE(parts_.names.isRunning());
 
   const MessageServer server(backplane_, "dac");
-  rounds_.beginWaiting();
+  rounds_.noteName();
   rounds_.resume();
 
   EXPECT_FALSE(binding->isWaiting());
@@ -124,14 +145,14 @@ TEST_F(BindingRoundsTest, WatchNamesWhileABindingWaitsForItsServer) {
 TEST_F(BindingRoundsTest, EndTheWatchAfterTheLastWaitingBindingIsRemoved) {
   addUnbound();
   const auto binding = add();
-  rounds_.beginWaiting();
+  rounds_.noteName();
   rounds_.resume();
   static_cast<void>(parts_.names.takeChange());
 
   rounds_.remove(*binding);
 
   EXPECT_TRUE(parts_.names.takeChange()) << "the next step looks whether a binding waits";
-  rounds_.beginWaiting();
+  rounds_.noteName();
   rounds_.resume();
   EXPECT_FALSE(parts_.names.isRunning());
 }
@@ -250,7 +271,7 @@ TEST_F(BindingRoundsTest, AShortageOfMemoryIsAnErrorBeforeABindingIsAdded) {
 
   const MessageServer server(backplane_, "dac");
   bindings_.back()->setServer("dac", 0);
-  rounds_.beginWaiting();
+  rounds_.noteName();
   EXPECT_TRUE(rounds_.resume());
   EXPECT_FALSE(bindings_.back()->isWaiting()) << "it was added";
 }
