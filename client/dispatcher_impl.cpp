@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/signals_blocked.h"
+#include "client/last_callbacks.h"
 
 namespace mpf {
 namespace {
@@ -39,22 +40,30 @@ Dispatcher::Impl::~Impl() {
 }
 
 void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
+  last_callbacks::prepare();
   const SignalsBlocked blocked;
   hasThread_ = true;
-  thread_ = std::thread([self] {
+  thread_ = std::thread([held = std::shared_ptr(self)]() mutable {
     ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
-    const auto guard = self->acquireLock();
-    while (!self->ended_.load(std::memory_order_relaxed)) {
-      try {
-        self->runOnce(Deadline::atNs(self->parts_.errors.dueNs()));
-      } catch (...) {  // thrown by a callback; this thread has no caller that could handle it
-        self->endpoint().control().alarms.fetch_add(1, std::memory_order_relaxed);
-        self->parts_.errors.report();
-      }
-      self->parts_.errors.writeDue();
-    }
-    self->parts_.errors.writeHeld();
+    held->runThread();
+    const bool isLast = held->endsAfterCallback_;
+    held.reset();
+    if (isLast) last_callbacks::end();
   });
+}
+
+void Dispatcher::Impl::runThread() {
+  const auto guard = acquireLock();
+  while (!ended_.load(std::memory_order_relaxed)) {
+    try {
+      runOnce(Deadline::atNs(parts_.errors.dueNs()));
+    } catch (...) {  // thrown by a callback; this thread has no caller that could handle it
+      endpoint().control().alarms.fetch_add(1, std::memory_order_relaxed);
+      parts_.errors.report();
+    }
+    parts_.errors.writeDue();
+  }
+  parts_.errors.writeHeld();
 }
 
 void Dispatcher::Impl::endThread() {
@@ -64,6 +73,8 @@ void Dispatcher::Impl::endThread() {
   interrupt();
   // A callback may destroy the last client: then this thread ends after the callback.
   if (parts_.lock.isMine()) {
+    endsAfterCallback_ = true;
+    last_callbacks::begin();
     thread_.detach();
   } else {
     thread_.join();

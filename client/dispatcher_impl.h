@@ -60,6 +60,7 @@ class Dispatcher::Impl {
   [[nodiscard]] BindingRounds& bindings() noexcept { return bindings_; }
 
  private:
+  void runThread();
   RunnerGuard acquireLock() {
     parts_.lock.acquire([this] { endpoint().interrupt(); });
     return RunnerGuard(&parts_.lock);
@@ -88,6 +89,7 @@ class Dispatcher::Impl {
   bool hasPostponed_ = false;  // there is work for handlePostponed()
   bool hasDescriptor_ = false;
   bool hasThread_ = false;
+  bool endsAfterCallback_ = false;  // its thread, in which the last client was destroyed
   std::thread thread_;
 };
 

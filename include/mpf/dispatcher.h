@@ -53,6 +53,8 @@ class Dispatcher {
 
   // The dispatcher of this process and backplane that has a thread. The first call creates it; it
   // is destroyed with its last owner; clients that were given only a backplane are owners.
+  // If a callback destroys the last owner, its thread ends after the callback, and exit() waits for
+  // that.
   //   throws  as the constructor; std::system_error with EAGAIN when no thread can be started
   static std::shared_ptr<Dispatcher> shared(const Backplane& backplane);
 

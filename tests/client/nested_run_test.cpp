@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Callbacks that run the dispatcher, and clients that are destroyed meanwhile.
 #include <atomic>
+#include <cstdlib>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -60,6 +61,30 @@ TEST_F(NestedRunTest, ACallbackMayDestroyTheClientWhoseConnectWaitRunsIt) {
   EXPECT_FALSE(client->connectWait(1h));
 
   EXPECT_EQ(client, nullptr);
+}
+
+// The thread of the shared dispatcher removes the files; exit() waits for it.
+TEST_F(NestedRunTest, AProcessThatExitsDuringItsLastCallbackLeavesNoFiles) {
+  MPF_NEEDS_A_CHILD;
+  const auto child = inAChild([&] {
+    const auto backplane = Backplane::named(backplane_.name());
+    std::atomic<bool> isDestroyed{false};
+    std::unique_ptr<MessageClient> client;
+    client = std::make_unique<MessageClient>(backplane, [&](const Message&) {
+      client.reset();
+      isDestroyed = true;
+      isDestroyed.notify_one();
+      std::this_thread::sleep_for(20ms);  // so that an exit that does not wait comes first
+    });
+    client->bind("echo");
+    isDestroyed.wait(false);
+    std::exit(0);
+  });
+  int status = 0;
+  ::waitpid(child, &status, 0);
+
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(countNames(backplane_, NameKind::clientWindow), 0);
 }
 
 TEST_F(NestedRunTest, ADestroyedClientKeepsNothingOfItsCallback) {
