@@ -5,6 +5,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -19,6 +20,9 @@ constexpr bool kIsModelled = false;
 #else
 constexpr bool kIsModelled = true;
 #endif
+
+enum class Registration { notTried, done, refused };
+std::atomic<Registration> registration{Registration::notTried};
 
 bool tryCommand(membarrier_cmd command) noexcept {
   return ::syscall(SYS_membarrier, command, 0, 0) == 0;
@@ -44,9 +48,15 @@ void execute(membarrier_cmd command) noexcept {
 
 }  // namespace
 
+// Two threads may register at once. A static variable of this function would make the child of a
+// fork wait for a thread of its parent that initialized it meanwhile, which takes milliseconds.
 bool tryRegister() noexcept {
-  static const bool kIsRegistered = canRegister();
-  return kIsRegistered;
+  auto known = registration.load(std::memory_order_relaxed);
+  if (known == Registration::notTried) {
+    known = canRegister() ? Registration::done : Registration::refused;
+    registration.store(known, std::memory_order_relaxed);
+  }
+  return known == Registration::done;
 }
 
 void acrossProcesses() noexcept { execute(MEMBARRIER_CMD_GLOBAL_EXPEDITED); }

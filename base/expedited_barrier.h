@@ -22,7 +22,7 @@ namespace mpf::expedited_barrier {
 // Lets barriers of other processes reach this process, and returns true when they do and this
 // process can execute both kinds. False where the kernel, a container or ThreadSanitizer, which
 // does not model such barriers, does not allow it. The first call registers; later calls, also in
-// the child of a fork, cost two loads.
+// the child of a fork, cost a load.
 [[nodiscard]] bool tryRegister() noexcept;
 
 // Call these only after tryRegister() has returned true. A failure, which a seccomp filter that was

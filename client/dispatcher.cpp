@@ -16,6 +16,8 @@ struct SharedDispatchers {
   std::map<std::string, std::weak_ptr<Dispatcher>> ofBackplanes;
 };
 
+constinit PerProcess<SharedDispatchers> sharedDispatchers;
+
 }  // namespace
 
 Dispatcher::Dispatcher(const Backplane& backplane, const DispatcherOptions& options)
@@ -23,8 +25,7 @@ Dispatcher::Dispatcher(const Backplane& backplane, const DispatcherOptions& opti
 Dispatcher::~Dispatcher() { impl_->endThread(); }
 
 std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
-  static PerProcess<SharedDispatchers> ofProcess;
-  auto& shared = ofProcess.get();
+  auto& shared = sharedDispatchers.get();
   const std::lock_guard lock(shared.mutex);
   auto& known = shared.ofBackplanes[backplane.name()];
   auto dispatcher = known.lock();
