@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "server/connection.h"
 
+#include <pthread.h>
+
 #include <bit>
 #include <mutex>
 #include <new>
@@ -14,17 +16,27 @@ namespace {
 std::mutex freeMutex;
 Connection* freeConnections = nullptr;  // under freeMutex
 
+// A fork waits until no thread holds the mutex: the child could never lock it again.
+[[maybe_unused]] const int kForkHandlers = ::pthread_atfork(
+    [] { freeMutex.lock(); }, [] { freeMutex.unlock(); }, [] { freeMutex.unlock(); });
+
+Connection* tryTakeFree() noexcept {
+  const std::lock_guard guard(freeMutex);
+  if (freeConnections == nullptr) return nullptr;
+  return std::exchange(freeConnections, freeConnections->nextFree);
+}
+
 }  // namespace
 
 Connection::Pointer Connection::take() {
-  auto* connection = [] {
-    const std::lock_guard guard(freeMutex);
-    return freeConnections == nullptr ? nullptr
-                                      : std::exchange(freeConnections, freeConnections->nextFree);
-  }();
-  if (connection == nullptr) connection = new Connection;
-  connection->forkGuard = {};
-  return Pointer(connection);
+  Pointer connection(tryTakeFree());
+  if (!connection) return Pointer(new Connection);
+  if (connection->forkGuard.isInherited()) {
+    // Another thread of the parent might have held the lock at the fork.
+    connection->lock = std::make_shared<BiasedLock>();
+    connection->forkGuard = {};
+  }
+  return connection;
 }
 
 // Gives requests that differ in more bits different places, up to the size at which the client must

@@ -37,8 +37,13 @@ struct Connection final : LinkUser {
   [[nodiscard]] Route routeOf(std::uint32_t requestId, RouteKeeper* keeper) noexcept {
     return {reinterpret_cast<std::uint64_t>(this), requestId, generation, keeper};
   }
-  // Whether this is a copy in a forked child: then its lock may be held for ever.
-  [[nodiscard]] bool isInherited() const noexcept { return forkGuard.isInherited(); }
+  // The connection of any route, for callers that lock it. Returns nullptr if the route has no
+  // link, and in the child of a fork: there, `lock` may be held for ever.
+  [[nodiscard]] static Connection* tryOf(const Route& route) noexcept {
+    if (route.link == 0) return nullptr;
+    auto& connection = of(route);
+    return connection.forkGuard.isInherited() ? nullptr : &connection;
+  }
   // Under lock: whether the client of this route is still connected.
   [[nodiscard]] bool isOpenFor(const Route& route) const noexcept {
     return generation == route.flags && channel;

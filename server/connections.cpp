@@ -152,18 +152,18 @@ void Connections::closeAll() noexcept {
 }
 
 std::uint64_t Connections::clientOf(const Route& request) noexcept {
-  if (request.link == 0) return 0;
-  auto& connection = Connection::of(request);
-  const BiasedLock::Guard lock(*connection.lock);
-  return connection.isOpenFor(request) ? connection.client() : 0;
+  const auto* const connection = Connection::tryOf(request);
+  if (connection == nullptr) return 0;
+  const BiasedLock::Guard lock(*connection->lock);
+  return connection->isOpenFor(request) ? connection->client() : 0;
 }
 
 bool Connections::isConnected(const Route& request) noexcept {
-  if (request.link == 0) return false;
-  auto& connection = Connection::of(request);
-  const BiasedLock::Guard lock(*connection.lock);
-  if (!connection.isOpenFor(request)) return false;
-  const auto& link = connection.channel->link();
+  const auto* const connection = Connection::tryOf(request);
+  if (connection == nullptr) return false;
+  const BiasedLock::Guard lock(*connection->lock);
+  if (!connection->isOpenFor(request)) return false;
+  const auto& link = connection->channel->link();
   return link.peerState() == layout::LinkState::open && !link.peer()->isDead();
 }
 
@@ -176,20 +176,20 @@ Route Connections::routeTo(std::uint64_t client, std::uint32_t requestId) const 
 
 bool Connections::isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept {
   const auto route = routeTo(client, requestId);
-  if (route.link == 0) return false;
-  auto& connection = Connection::of(route);
-  const BiasedLock::Guard lock(*connection.lock);
-  return connection.isOpenFor(route) && connection.isUnanswered(requestId);
+  auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return false;
+  const BiasedLock::Guard lock(*connection->lock);
+  return connection->isOpenFor(route) && connection->isUnanswered(requestId);
 }
 
 std::vector<std::uint32_t> Connections::unanswered(std::uint64_t client) const {
   const auto route = routeTo(client, 0);
   std::vector<std::uint32_t> ids;
-  if (route.link == 0) return ids;
-  auto& connection = Connection::of(route);
-  const BiasedLock::Guard lock(*connection.lock);
-  if (!connection.isOpenFor(route)) return ids;
-  for (const auto& place : connection.unanswered) {
+  const auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return ids;
+  const BiasedLock::Guard lock(*connection->lock);
+  if (!connection->isOpenFor(route)) return ids;
+  for (const auto& place : connection->unanswered) {
     if (const auto id = place.load(std::memory_order_relaxed); id != 0) ids.push_back(id);
   }
   return ids;

@@ -42,12 +42,14 @@ BodyBytes FanOutBodies::lend(std::shared_ptr<FanOutChunk> chunk, std::size_t byt
 }
 
 std::shared_ptr<FanOutChunk> FanOutBodies::tryFind(const std::byte* data) const noexcept {
+  if (forkGuard_.isInherited()) return nullptr;
   const std::lock_guard lock(mutex_);
   const auto lent = chunkAt(lent_, data);
   return lent == lent_.end() ? nullptr : *lent;
 }
 
 void FanOutBodies::takeBack(std::byte* data, std::size_t) noexcept {
+  if (forkGuard_.isInherited()) return;
   std::shared_ptr<FanOutBodies> last;  // destroyed after the guard; may destroy this object
   const std::lock_guard lock(mutex_);
   const auto lent = chunkAt(lent_, data);
@@ -114,11 +116,10 @@ ReplyResult Publisher::relay(const Message& message, std::uint32_t missed) noexc
 
 ReplyResult Publisher::send(const Message& message, const Message& request,
                             const std::shared_ptr<FanOutChunk>& chunk, Missed missed) noexcept {
-  if (!message || request.route().link == 0) return ReplyResult::clientGone;
-  auto& connection = Connection::of(request.route());
-  if (connection.isInherited()) return ReplyResult::clientGone;
-  const BiasedLock::Guard lock(*connection.lock);
-  return sendLocked(connection, message, request, chunk, missed);
+  auto* const connection = Connection::tryOf(request.route());
+  if (!message || !request || connection == nullptr) return ReplyResult::clientGone;
+  const BiasedLock::Guard lock(*connection->lock);
+  return sendLocked(*connection, message, request, chunk, missed);
 }
 
 ReplyResult Publisher::sendLocked(Connection& connection, const Message& message,

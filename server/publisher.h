@@ -28,16 +28,18 @@
 
 namespace mpf {
 
-// The lender of the bodies that a program builds. Such a body may outlive the server.
+// The lender of the bodies that a program builds. Such a body may outlive the server. The copy in
+// the child of a fork does nothing: another thread of the parent might have held the mutex.
 class FanOutBodies final : public BodyLender, public std::enable_shared_from_this<FanOutBodies> {
  public:
   //   throws  std::bad_alloc
   BodyBytes lend(std::shared_ptr<FanOutChunk> chunk, std::size_t bytes);
-  // The chunk of a body that was lent.
+  // The chunk of a body that was lent; nullptr in the child of a fork.
   [[nodiscard]] std::shared_ptr<FanOutChunk> tryFind(const std::byte* data) const noexcept;
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
+  ForkGuard forkGuard_;
   mutable std::mutex mutex_;  // guards the members below
   std::vector<std::shared_ptr<FanOutChunk>> lent_;
   std::shared_ptr<FanOutBodies> self_;  // set while lent_ is not empty

@@ -24,13 +24,10 @@ auto noteSent(Link& link) noexcept {
 }  // namespace
 
 ReplyResult ReplySender::send(Message& message) noexcept {
-  if (!message || message.route().link == 0) return ReplyResult::clientGone;
-  auto& connection = Connection::of(message.route());
-  if (connection.isInherited()) return ReplyResult::clientGone;
-  ReplyResult result{};
-  {
-    const BiasedLock::Guard lock(*connection.lock);
-    result = sendOneLocked(connection, message);
+  auto result = ReplyResult::clientGone;
+  if (auto* const connection = Connection::tryOf(message.route()); connection && message) {
+    const BiasedLock::Guard lock(*connection->lock);
+    result = sendOneLocked(*connection, message);
   }
   if (result == ReplyResult::sent || result == ReplyResult::clientGone) message.reset();
   return result;
@@ -52,12 +49,11 @@ RepliedMany ReplySender::sendMany(std::span<Message> messages) noexcept {
 // that are counted, without the lock. The result is `clientGone` only if none was sent.
 RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const auto& route = messages.front().route();
-  if (route.link == 0) return {0, ReplyResult::clientGone};
-  auto& connection = Connection::of(route);
-  if (connection.isInherited()) return {0, ReplyResult::clientGone};
-  const BiasedLock::Guard lock(*connection.lock);
-  if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
-  auto& link = connection.channel->link();
+  auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return {0, ReplyResult::clientGone};
+  const BiasedLock::Guard lock(*connection->lock);
+  if (!connection->isOpenFor(route)) return {0, ReplyResult::clientGone};
+  auto& link = connection->channel->link();
   const Link::Batch batch(link);
   const auto sentBefore = link.outgoing().messages();
   RepliedMany sent;
@@ -65,7 +61,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const auto generation = route.flags;
   for (auto& message : messages) {
     if (message.route().link != client || message.route().flags != generation) break;
-    if (message) sent.result = sendLocked(connection, message);
+    if (message) sent.result = sendLocked(*connection, message);
     if (sent.result != ReplyResult::sent) break;
     ++sent.count;
   }
@@ -88,28 +84,27 @@ RepliedMany ReplySender::sendBodies(const Message& request, const Bodies& bodies
 
 RepliedMany ReplySender::sendRun(const Message& request, const Bodies& bodies) noexcept {
   const auto& route = request.route();
-  if (route.link == 0) return {0, ReplyResult::clientGone};
-  auto& connection = Connection::of(route);
-  if (connection.isInherited()) return {0, ReplyResult::clientGone};
-  const BiasedLock::Guard lock(*connection.lock);
-  if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
-  const Link::Batch batch(connection.channel->link());
+  auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return {0, ReplyResult::clientGone};
+  const BiasedLock::Guard lock(*connection->lock);
+  if (!connection->isOpenFor(route)) return {0, ReplyResult::clientGone};
+  const Link::Batch batch(connection->channel->link());
   const auto count = bodies.count();
   RepliedMany sent;
   const bool fillSlots =
-      bodies.fillSlots() && bodies.size <= connection.channel->link().maxMessageBytes();
+      bodies.fillSlots() && bodies.size <= connection->channel->link().maxMessageBytes();
   // The first reply, which ends the request, and bodies of other lengths go as messages. They are
   // copies: a body in a chunk would be sent in place, and the chunk belongs to the caller.
-  while (sent.count < count && (!fillSlots || connection.isUnanswered(route.requestId))) {
+  while (sent.count < count && (!fillSlots || connection->isUnanswered(route.requestId))) {
     auto message = Message::copyInline(bodies.type, bodies.from(sent.count).first(1).all);
     message.setRoute({route.link, route.requestId, route.flags, nullptr});
     message.setClientType(request.getClientType());
     message.setClientExtra(request.getClientExtra());
-    sent.result = sendLocked(connection, message);
+    sent.result = sendLocked(*connection, message);
     if (sent.result != ReplyResult::sent) break;
     ++sent.count;
   }
-  if (sent.result == ReplyResult::sent) sendFullSlotsLocked(connection, request, bodies, sent);
+  if (sent.result == ReplyResult::sent) sendFullSlotsLocked(*connection, request, bodies, sent);
   if (sent.count != 0) counts_.sent(sent.count);
   return sent;
 }
@@ -150,16 +145,15 @@ void ReplySender::sendRun(Connection& connection, std::uint32_t generation,
 }
 
 std::size_t ReplySender::sendRun(const Route& route, const MessageRun& run, bool isFirst) noexcept {
-  if (route.link == 0) return 0;
-  auto& connection = Connection::of(route);
-  if (connection.isInherited()) return 0;
-  const BiasedLock::Guard lock(*connection.lock);
-  if (!connection.isOpenFor(route) ||
-      connection.channel->link().maxMessageBytes() < layout::kFirstSlotBodyBytes)
+  auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return 0;
+  const BiasedLock::Guard lock(*connection->lock);
+  if (!connection->isOpenFor(route) ||
+      connection->channel->link().maxMessageBytes() < layout::kFirstSlotBodyBytes)
     return 0;
   std::size_t count = 0;
-  while (count < run.size() && connection.isUnanswered(run[count].requestId()) == isFirst) ++count;
-  return sendRunLocked(connection, run, count, isFirst);
+  while (count < run.size() && connection->isUnanswered(run[count].requestId()) == isFirst) ++count;
+  return sendRunLocked(*connection, run, count, isFirst);
 }
 
 // Sends the first `count` messages of a run. Returns the number of replies. There is room for all
@@ -252,21 +246,20 @@ void ReplySender::sendFate(Connection& connection, RequestMarks request, Fate fa
 }
 
 void ReplySender::refuseAbandoned(const Route& route) noexcept {
-  auto& connection = Connection::of(route);
-  if (connection.isInherited()) return;
-  const BiasedLock::Guard lock(*connection.lock);
-  if (!connection.isOpenFor(route) || !connection.isUnanswered(route.requestId)) return;
+  auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return;
+  const BiasedLock::Guard lock(*connection->lock);
+  if (!connection->isOpenFor(route) || !connection->isUnanswered(route.requestId)) return;
   Message message = RequestFateMessage({.fate = Fate::refused, .requestId = route.requestId});
-  message.setRoute(connection.routeOf(route.requestId, nullptr));
-  if (sendOneLocked(connection, message) == ReplyResult::sent) counts_.refused();
+  message.setRoute(connection->routeOf(route.requestId, nullptr));
+  if (sendOneLocked(*connection, message) == ReplyResult::sent) counts_.refused();
 }
 
 BodyBytes ReplySender::tryAllocateInPool(const Route& route, std::size_t bytes) noexcept {
-  if (route.link == 0) return {};
-  auto& connection = Connection::of(route);
-  if (connection.isInherited()) return {};
-  const BiasedLock::Guard lock(*connection.lock);
-  return connection.isOpenFor(route) ? connection.channel->tryAllocateLocked(bytes) : BodyBytes{};
+  auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return {};
+  const BiasedLock::Guard lock(*connection->lock);
+  return connection->isOpenFor(route) ? connection->channel->tryAllocateLocked(bytes) : BodyBytes{};
 }
 
 BodyBytes ReplySender::allocate(const Route& route, std::size_t bytes) {

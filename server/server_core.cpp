@@ -68,6 +68,7 @@ ServerCore::~ServerCore() {
 }
 
 void ServerCore::setQueueSize(int size) {
+  endpoint_.forkGuard().check("MessageServer");
   endpoint_.control().queueSize.store(static_cast<std::uint32_t>(checkedQueueSize(size)),
                                       std::memory_order_relaxed);
 }
@@ -91,6 +92,7 @@ void ServerCore::interrupt() noexcept {
 }
 
 int ServerCore::descriptor() {
+  endpoint_.forkGuard().check("MessageServer");
   hasDescriptor_ = true;
   static_cast<void>(endpoint_.arm());
   return endpoint_.descriptor();
@@ -345,6 +347,7 @@ void ServerCore::noteTimes(Connection& connection, std::uint32_t requestId,
 }
 
 ServerCore::Counts ServerCore::counts() const {
+  endpoint_.forkGuard().check("MessageServer");
   const auto& control = endpoint_.control();
   Counts counts{control.queueSize.load(std::memory_order_relaxed), 0,
                 control.received.load(std::memory_order_relaxed), 0,

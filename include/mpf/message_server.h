@@ -17,7 +17,10 @@
 //          allocReplyMessage(), allocShared(), publish(), refuse(), isClientConnected(),
 //          countAlarm() and interrupt().
 // Fork     in the child of a fork, the parent's servers refuse to work: waitForMessage(), receive()
-//          and what calls them throw std::logic_error, replies return clientGone.
+//          and what calls them, descriptor(), setQueueSize() and report() throw std::logic_error;
+//          reply(), replyMany() and publish() return clientGone, clientOf() 0, isClientConnected()
+//          false; messages are allocated on the heap; interrupt(), countAlarm() and the
+//          destructors of servers and handles change nothing of the parent.
 // Crash    when a client dies, the handles of its requests stay valid; replies to them return
 //          clientGone. Its shared memory is freed when the last of these handles is destroyed;
 //          published messages that it held are freed at once.
@@ -281,6 +284,7 @@ class MessageServer {
   // For event loops: poll() the descriptor for reading, then call receive() until it returns an
   // empty handle, which makes the descriptor unreadable until there is something to do again. The
   // server owns the descriptor.
+  //   throws  std::logic_error in the child of a fork
   [[nodiscard]] int descriptor();
 
   // Prints name, queueSize, inQueue, queueRequests, queueFullResponses and replyRequests to stdout

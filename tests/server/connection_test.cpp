@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/base/child_process.h"
+
 namespace mpf::test {
 namespace {
 
@@ -16,6 +18,21 @@ TEST(ConnectionTest, AFreeObjectIsReused) {
   first.reset();
 
   EXPECT_EQ(Connection::take().get(), object);
+}
+
+TEST(ConnectionTest, AFreeObjectHasANewLockInTheChildOfAFork) {
+  auto* const object = Connection::take().get();  // free again
+  const auto inherited = object->lock;
+
+  const auto status = endOf([&] {
+    const auto connection = Connection::take();
+    EXPECT_EQ(connection.get(), object);
+    EXPECT_NE(connection->lock, inherited) << "another thread may have held it at the fork";
+    EXPECT_EQ(Connection::tryOf(connection->routeOf(3, nullptr)), object);
+    return testing::Test::HasFailure() ? 1 : 0;
+  });
+
+  EXPECT_EQ(status, 0);
 }
 
 TEST(ConnectionTest, ARouteLeadsToItsConnection) {

@@ -2,6 +2,9 @@
 // Connections: clients that connect, disconnect and die, and the numbers of clients and requests.
 #include "server/connections.h"
 
+#include <signal.h>
+#include <sys/prctl.h>
+
 #include <atomic>
 #include <bit>
 #include <gmock/gmock.h>
@@ -11,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/base/child_process.h"
 #include "tests/server/server_parts_fixture.h"
 
 namespace mpf::test {
@@ -155,6 +159,24 @@ TEST_F(ConnectionsTest, ARequestWaitsForTheReplyThatMakesItsPlaceFree) {
   EXPECT_TRUE(isNoted);
   EXPECT_TRUE(connection.isUnanswered(1 + places));
   EXPECT_FALSE(connection.tryNoteRequest(1)) << "not free now";
+}
+
+TEST_F(ConnectionsTest, WaitsForNoLockInTheChildOfAFork) {
+  auto& connection = accept(createLink());
+  const auto client = connection.client();
+  const auto route = noteRequest(connection, 3);
+  const BiasedLock::Guard lock(*connection.lock);  // never released in the child
+
+  const auto status = endOf([&] {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    EXPECT_EQ(Connections::clientOf(route), 0u);
+    EXPECT_FALSE(Connections::isConnected(route));
+    EXPECT_FALSE(connections_.isUnanswered(client, 3));
+    EXPECT_THAT(connections_.unanswered(client), testing::IsEmpty());
+    return HasFailure() ? 1 : 0;
+  });
+
+  EXPECT_EQ(status, 0);
 }
 
 TEST_F(ConnectionsTest, CloseAllEndsEachConnection) {

@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "tests/base/child_process.h"
 #include "tests/server/server_parts_fixture.h"
 #include "tests/support/random.h"
 
@@ -191,6 +192,16 @@ TEST_F(PublisherTest, RefusesWhatIsNoRequestOfThisServer) {
   EXPECT_EQ(publish(Message(), request), ReplyResult::clientGone);
 }
 
+TEST_F(PublisherTest, AHandleThatWasMovedFromIsNoRequest) {
+  auto subscriber = subscribe();
+  const auto request = std::move(subscriber.request);
+
+  // NOLINTNEXTLINE(bugprone-use-after-move): it is empty, and keeps its route
+  EXPECT_EQ(publish(filled(0), subscriber.request), ReplyResult::clientGone);
+
+  EXPECT_FALSE(subscriber.link.incoming().hasMessage());
+}
+
 TEST_F(PublisherTest, RefusesATooLargeMessageWithoutCountingIt) {
   auto subscriber = subscribe();
   const auto large = Char8ArrayMessage::allocValue((1 << 20) + 1);  // Offer::maxMessageBytes
@@ -234,6 +245,25 @@ TEST_F(PublisherTest, ABodyMayOutliveTheServer) {
 
   EXPECT_EQ(files(), 0u);
   EXPECT_EQ(message.value()[kElements - 1], 3.0);
+}
+
+// Another thread of the parent may have held the mutex at the fork.
+TEST_F(PublisherTest, LendsNothingInTheChildOfAFork) {
+  const auto bodies = std::make_shared<FanOutBodies>();
+  FanOutPool pool(name(), server_->endpoint.window().header().incarnation, {}, 1u << 20);
+  const auto body = bodies->lend(pool.tryAlloc(1000), 1000);
+  const auto owners = bodies.use_count();
+
+  const auto status = endOf([&] {
+    EXPECT_EQ(bodies->tryFind(body.data), nullptr);
+    bodies->takeBack(body.data, body.capacity);
+    EXPECT_EQ(bodies.use_count(), owners) << "nothing was taken back";
+    return HasFailure() ? 1 : 0;
+  });
+
+  EXPECT_EQ(status, 0);
+  EXPECT_NE(bodies->tryFind(body.data), nullptr);
+  bodies->takeBack(body.data, body.capacity);
 }
 
 TEST_F(PublisherTest, RefusesAnInvalidLimit) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/base/child_process.h"
 #include "tests/server/server_parts_fixture.h"
 
 namespace mpf::test {
@@ -70,10 +71,25 @@ TEST_F(ReplySenderTest, AReplyToAClientThatHasDisconnectedIsDropped) {
   EXPECT_FALSE(link_.incoming().hasMessage());
 }
 
-TEST_F(ReplySenderTest, AMessageWithoutARouteIsNoReply) {
+TEST_F(ReplySenderTest, AMessageWithoutARouteIsNoReplyAndIsDropped) {
   Int32Message message;
 
   EXPECT_EQ(replies_.send(message), ReplyResult::clientGone);
+
+  EXPECT_FALSE(message);
+}
+
+TEST_F(ReplySenderTest, AReplyInTheChildOfAForkIsDropped) {
+  auto reply = replyTo(noteRequest(connection_, 3));
+
+  const auto status = endOf([&] {
+    EXPECT_EQ(replies_.send(reply), ReplyResult::clientGone);
+    EXPECT_FALSE(reply);
+    return HasFailure() ? 1 : 0;
+  });
+
+  EXPECT_EQ(status, 0);
+  EXPECT_FALSE(link_.incoming().hasMessage());
 }
 
 TEST_F(ReplySenderTest, AReplyAboveTheLimitStaysWithItsOwner) {

@@ -87,6 +87,10 @@ TEST_F(ForkTest, InheritedObjectsRefuseUseInAChild) {
     EXPECT_EQ(sync_->call(Float64Message({.value = 1}), 60s).refusal(), SendResult::notConnected);
     EXPECT_THROW(server_->waitForMessage(), std::logic_error);
     EXPECT_THROW(server_->receive(), std::logic_error);
+    EXPECT_THROW(server_->run(), std::logic_error);
+    EXPECT_THROW(static_cast<void>(server_->descriptor()), std::logic_error);
+    EXPECT_THROW(server_->setQueueSize(7), std::logic_error);
+    EXPECT_THROW(server_->report(), std::logic_error);
   });
 
   EXPECT_EQ(status, 0);
