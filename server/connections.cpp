@@ -27,6 +27,14 @@ bool isBorrowing(Connection& connection) noexcept {
   return link.borrowedFanOut() != 0;
 }
 
+using Channels = std::vector<std::shared_ptr<MessageLink>>;
+
+void keep(const std::shared_ptr<MessageLink>& channel, Channels& channels) noexcept try {
+  channels.push_back(channel);
+  // NOLINTNEXTLINE(bugprone-empty-catch): the server does not wait for this client
+} catch (const std::bad_alloc&) {
+}
+
 }  // namespace
 
 void Connections::reportClient(std::uint64_t client, bool isConnected) noexcept try {
@@ -41,7 +49,7 @@ void Connections::reportClient(std::uint64_t client, bool isConnected) noexcept 
 
 void Connections::throwNext() {
   const auto first = std::move(thrown_.front());
-  thrown_.pop_front();
+  thrown_.erase(thrown_.begin());
   std::rethrow_exception(first);
 }
 
@@ -122,24 +130,31 @@ void Connections::closeDead() noexcept {
   }
 }
 
-// The client owned the link and has died, so the server may remove its names.
-void Connections::removeFilesOf(const Link& link) noexcept {
+// The client owned the link and has died, so the server may remove its names. Without memory for
+// them, they stay until another process attaches to the backplane or removes them.
+void Connections::removeFilesOf(const Link& link) noexcept try {
   Link::removeFiles(endpoint_.backplane().name(), link.name(), link.header().incarnation);
+  // NOLINTNEXTLINE(bugprone-empty-catch): as above
+} catch (const std::exception&) {
+}
+
+void Connections::removeClientOf(const Link& link) noexcept try {
+  removeFilesOf(link);
+  stale_segments::removeDeadWindow(endpoint_.backplane().name(), link.peer()->name(),
+                                   link.peer()->header().incarnation);
+  // NOLINTNEXTLINE(bugprone-empty-catch): as above
+} catch (const std::exception&) {
 }
 
 // Also removes the files of clients whose death the server has not noticed yet: no later call will.
 void Connections::closeAll() noexcept {
-  std::vector<std::shared_ptr<MessageLink>> others;
+  Channels others;
   for (const auto& connection : all_) {
     if (!connection->channel) continue;
     auto& link = connection->channel->link();
-    if (!link.peer()->hasOwner()) {
-      removeFilesOf(link);
-      stale_segments::removeDeadWindow(endpoint_.backplane().name(), link.peer()->name(),
-                                       link.peer()->header().incarnation);
-    } else if (!link.tryLeavePoolToClient() || isBorrowing(*connection)) {
-      others.push_back(connection->channel);
-    }
+    if (!link.peer()->hasOwner()) removeClientOf(link);
+    else if (!link.tryLeavePoolToClient() || isBorrowing(*connection))
+      keep(connection->channel, others);
     close(*connection);
   }
   // Clients of other users cannot remove the server's pool files, and none can remove those of the

@@ -10,7 +10,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <exception>
 #include <functional>
 #include <map>
@@ -67,12 +66,13 @@ class Connections {
  private:
   void reportClient(std::uint64_t client, bool isConnected) noexcept;
   void removeFilesOf(const Link& link) noexcept;
+  void removeClientOf(const Link& link) noexcept;
 
   Endpoint& endpoint_;
   std::vector<Connection::Pointer> all_;
   std::map<std::uint64_t, Connection*> byLink_;  // the open ones
   std::function<void(std::uint64_t, bool)> onClient_;
-  std::deque<std::exception_ptr> thrown_;
+  std::vector<std::exception_ptr> thrown_;  // the oldest first
 };
 
 }  // namespace mpf

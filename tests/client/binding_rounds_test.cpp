@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: MIT
+// BindingRounds: bindings that wait, are due, or are removed, also without memory.
 #include "client/binding_rounds.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <memory>
 #include <new>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <mpf/message_server.h>
 
 #include "shm/segment_name.h"
 #include "tests/client/binding_parts_fixture.h"
-#include "tests/client/limited_memory.h"
+#include "tests/support/limited_memory.h"
 
 namespace mpf::test {
 namespace {
@@ -51,14 +54,12 @@ class BindingRoundsTest : public BindingPartsTest {
   }
   // Calls handleDue() with memory for this number of allocations. Returns false when it throws.
   bool tryHandleDue(int allocations) {
-    allocationsLeft = allocations;
+    const LimitedMemory limited(allocations);
     try {
       rounds_.handleDue();
     } catch (const std::bad_alloc&) {
-      allocationsLeft = kUnlimited;
       return false;
     }
-    allocationsLeft = kUnlimited;
     return true;
   }
 
@@ -260,14 +261,14 @@ TEST_F(BindingRoundsTest, AShortageOfMemoryLosesNoTimer) {
 // The thread that adds a binding has no caller that it could tell.
 TEST_F(BindingRoundsTest, AShortageOfMemoryIsAnErrorBeforeABindingIsAdded) {
   bindings_.push_back(std::make_shared<Binding>(parts_, [](Message&&) {}));
-  allocationsLeft = 0;
+  std::optional<LimitedMemory> limited(std::in_place, 0);
   EXPECT_THROW(BindingRounds::Place(bindings_.back()), std::bad_alloc);
-  allocationsLeft = kUnlimited;
+  limited.reset();
   BindingRounds::Place place(bindings_.back());
 
-  allocationsLeft = 0;
+  limited.emplace(0);
   rounds_.add(std::move(place));
-  allocationsLeft = kUnlimited;
+  limited.reset();
 
   const MessageServer server(backplane_, "dac");
   bindings_.back()->setServer("dac", 0);
@@ -288,11 +289,11 @@ TEST_F(BindingRoundsTest, ABindingThatIsAddedWithoutMemoryKeepsItsTimer) {
   rounds_.handleDue();
   sendExpired(*binding);
   BindingRounds::Place place(binding);
-  allocationsLeft = 0;
+  std::optional<LimitedMemory> limited(std::in_place, 0);
 
   EXPECT_THROW(rounds_.add(std::move(place)), std::bad_alloc);
 
-  allocationsLeft = kUnlimited;
+  limited.reset();
   while (parts_.timer.isDue()) rounds_.handleDue();
   EXPECT_TRUE(hasExpired);
 }

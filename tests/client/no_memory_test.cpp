@@ -12,7 +12,7 @@
 #include "shm/segment_name.h"
 #include "shm/watcher.h"
 #include "tests/client/binding_parts_fixture.h"
-#include "tests/client/limited_memory.h"
+#include "tests/support/limited_memory.h"
 #include "tests/support/watchdog.h"
 
 namespace mpf::test {

@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Operator new of the program of this file fails when a thread may allocate no more.
+// LimitedMemory: lets allocations of one thread fail, after a number that succeed.
+//
+//   const LimitedMemory limited(3);  // from here on, the fourth operator new throws std::bad_alloc
+//
+// An executable that uses it has another operator new: limited_memory.cpp.
+//
+// Threads  each thread has its own limit.
 #pragma once
 
 #include <atomic>

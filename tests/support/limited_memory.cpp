@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "tests/client/limited_memory.h"
+#include "tests/support/limited_memory.h"
 
 #include <algorithm>
 #include <cstdlib>

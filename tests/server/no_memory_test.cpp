@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// A server whose process has no memory: it throws std::bad_alloc, or continues without it.
+#include <signal.h>
+
+#include <gtest/gtest.h>
+#include <memory>
+#include <new>
+#include <optional>
+#include <vector>
+
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "tests/shm/child.h"
+#include "tests/support/limited_memory.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr const char* kName = "a server whose name needs an allocation";
+constexpr int kMost = 12;  // more allocations than the functions below make
+
+class NoMemoryTest : public testing::Test {
+ protected:
+  // A server, and a request of a client that was killed.
+  struct Bereaved {
+    std::unique_ptr<MessageServer> server;
+    Message request;
+  };
+  Bereaved serverOfAKilledClient() {
+    Bereaved made{std::make_unique<MessageServer>(backplane_, kName), {}};
+    Child client([&](Child::Self& self) {
+      MessageClient sender(Backplane::named(backplane_.name()), [](const Message&) {});
+      sender.bind(kName);
+      self.ready();
+      EXPECT_TRUE(sender.connectWait(60s));
+      EXPECT_EQ(sender.send(Int32Message()), SendResult::sent);
+      self.stay();
+    });
+    client.go();
+    while (!(made.request = made.server->receive())) made.server->waitForMessage();
+    client.end(SIGKILL);
+    return made;
+  }
+
+  Watchdog watchdog_{"no memory test"};
+  TestBackplane backplane_;
+};
+
+TEST_F(NoMemoryTest, TheConstructorThrows) {
+  std::unique_ptr<MessageServer> server;
+  int allocations = 0;
+
+  for (; server == nullptr; ++allocations) {
+    try {
+      const LimitedMemory limited(allocations);
+      server = std::make_unique<MessageServer>(backplane_, kName);
+    } catch (const std::bad_alloc&) {
+    }
+  }
+
+  EXPECT_GT(allocations, 2);
+  EXPECT_EQ(server->getName(), kName);
+}
+
+TEST_F(NoMemoryTest, TheDeathOfAClientEndsItsConnection) {
+  for (int allocations = 0; allocations < kMost; ++allocations) {
+    auto [server, request] = serverOfAKilledClient();
+
+    while (server->clientOf(request) != 0) {
+      server->waitForMessage();
+      try {
+        const LimitedMemory limited(allocations);
+        EXPECT_FALSE(server->receive());
+      } catch (const std::bad_alloc&) {
+      }
+    }
+
+    EXPECT_EQ(server->reply(std::move(request)), ReplyResult::clientGone);
+    static_cast<void>(backplane_.removeDead());
+  }
+}
+
+TEST_F(NoMemoryTest, AServerEndsAfterTheDeathOfAClient) {
+  for (int allocations = 0; allocations < kMost; ++allocations) {
+    auto [server, request] = serverOfAKilledClient();
+
+    {
+      const LimitedMemory limited(allocations);
+      server.reset();
+    }
+
+    static_cast<void>(backplane_.removeDead());
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test
