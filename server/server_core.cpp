@@ -8,6 +8,7 @@
 
 #include "base/step.h"
 #include "shm/histogram.h"
+#include "shm/rights_text.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -37,7 +38,8 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
       location_(options.location),
       endpoint_(
           backplane, layout::SegmentKind::serverWindow,
-          windowName(backplane, name, options.location), options.rights, options.waitMode,
+          windowName(backplane, name, options.location), checkServerRights(options.rights),
+          options.waitMode,
           [&](layout::SegmentHeader& header) {
             const auto queueSize = static_cast<std::uint32_t>(checkedQueueSize(options.queueSize));
             header.location = options.location;

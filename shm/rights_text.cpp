@@ -15,16 +15,32 @@ namespace {
 constexpr mode_t kAnybodyReadsAndWrites = 0666;
 constexpr mode_t kOwnerReadsAndWrites = 0600;
 
+bool isValid(mode_t mode) {
+  return (mode & ~kAnybodyReadsAndWrites) == 0 &&
+         (mode & kOwnerReadsAndWrites) == kOwnerReadsAndWrites;
+}
+
 }  // namespace
 
 mode_t parseMode(const std::string& text) {
   const auto mode = tryNumber<mode_t>(text, 8);
-  if (mode && (*mode & ~kAnybodyReadsAndWrites) == 0 &&
-      (*mode & kOwnerReadsAndWrites) == kOwnerReadsAndWrites) {
-    return *mode;
-  }
+  if (mode && isValid(*mode)) return *mode;
   throw std::invalid_argument(
       fmt::format("{}: use an octal number between 0600 and 0666, such as 0660", text));
+}
+
+const Rights& checkServerRights(const Rights& rights) {
+  if (!isValid(rights.mode))
+    throw std::invalid_argument(fmt::format(
+        "mode {:#o} of the rights: use read and write bits of user, group and others (0666), with "
+        "at least those of the user (0600); an octal number such as 0660 begins with 0",
+        rights.mode));
+  if (rights.user != Rights().user)
+    throw std::invalid_argument(fmt::format(
+        "user {} of the rights: the segments of a server belong to the user of its process; admit "
+        "other users by mode and group",
+        rights.user));
+  return rights;
 }
 
 std::uint32_t parseGroup(const std::string& name) {

@@ -14,10 +14,12 @@
 
 namespace mpf {
 
-//   mode   permission bits, as for chmod(2): the read and write bits of user, group and others
+//   mode   permission bits, as for chmod(2): the read and write bits of user, group and others, at
+//          least 0600
 //   group  number of the group that gets the segments; ~0: the group of the process
-//   user   number of the user that gets them; ~0: the user of the process. Only root may give a
-//          segment to another user
+//   user   leave it ~0: the user of the process. A server refuses others, because the owner of a
+//          file may change who writes it. A client that root runs uses it, to give a link to the
+//          user of its server
 struct Rights {
   mode_t mode = 0600;
   std::uint32_t group = ~std::uint32_t{0};

@@ -27,6 +27,12 @@ TEST(MessageServerTest, AnInvalidNameOrQueueSizeIsAnError) {
   EXPECT_THROW(MessageServer(backplane, "server", {.queueSize = 0}), std::invalid_argument);
 }
 
+TEST(MessageServerTest, InvalidRightsAreAnError) {
+  const TestBackplane backplane;
+
+  EXPECT_THROW(MessageServer(backplane, "server", {.rights = {.mode = 0}}), std::invalid_argument);
+}
+
 TEST(MessageServerTest, AReplyWithoutARequestIsNotSent) {
   const TestBackplane backplane;
   MessageServer server(backplane, "server");

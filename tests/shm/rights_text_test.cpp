@@ -2,6 +2,7 @@
 // RightsText: modes and groups as options name them.
 #include "shm/rights_text.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <stdexcept>
 
@@ -25,6 +26,21 @@ TEST_P(InvalidModes, AreRefusedWithTheTextAndTheLimits) {
 INSTANTIATE_TEST_SUITE_P(Each, InvalidModes,
                          testing::Values("", "0", "0400", "0066", "0777", "0680", "0600 ", "-0600",
                                          "77777777777777777777"));
+
+class InvalidRights : public testing::TestWithParam<mode_t> {};
+
+TEST_P(InvalidRights, AreRefusedWithTheModeAndTheValidBits) {
+  EXPECT_THAT(whatOf<std::invalid_argument>([] { checkServerRights({.mode = GetParam()}); }),
+              testing::AllOf(testing::StartsWith(fmt::format("mode {:#o} ", GetParam())),
+                             testing::HasSubstr("0666"), testing::HasSubstr("0600")));
+}
+INSTANTIATE_TEST_SUITE_P(Each, InvalidRights, testing::Values(0, 0111, 0400, 0066, 07777, 660));
+
+TEST(RightsText, AServerBelongsToItsOwnUser) {
+  EXPECT_THAT(whatOf<std::invalid_argument>([] { checkServerRights({.user = 65534}); }),
+              testing::StartsWith("user 65534 "));
+  EXPECT_EQ(checkServerRights({.mode = 0660, .group = 7}), (Rights{.mode = 0660, .group = 7}));
+}
 
 TEST(RightsText, AGroupIsFoundByItsName) { EXPECT_EQ(parseGroup("root"), 0u); }
 
