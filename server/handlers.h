@@ -48,6 +48,9 @@ class Handlers {
     return handler != nullptr && handler->forRun ? &handler->forRun : nullptr;
   }
 
+  // Whether a handler is being called.
+  [[nodiscard]] bool isCalling() const noexcept { return calls_ != 0; }
+
   // Exists while a handler is called. Calls may be nested.
   class Call {
    public:

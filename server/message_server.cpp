@@ -108,6 +108,7 @@ void MessageServer::handle(Message&& request) {
 }
 
 void MessageServer::run() {
+  const ServerCore::Run run(*core_);
   while (waitForMessage()) {
     while (!core_->isInterrupted() && handleOne()) {
     }

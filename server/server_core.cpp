@@ -78,14 +78,29 @@ void ServerCore::setQueueSize(int size) {
 bool ServerCore::wait(Deadline deadline) {
   endpoint_.forkGuard().check("MessageServer");
   endHandling();
+  // A handler that waits leaves the interrupt to the run() that has called it.
   const auto stopped = [this] {
     return stop_.load(std::memory_order_relaxed) &&
-           stop_.exchange(false, std::memory_order_relaxed);
+           (handlers_.isCalling() || stop_.exchange(false, std::memory_order_relaxed));
   };
   if (stopped()) return false;
   const bool hasEvent = endpoint_.wait(deadline);
   if (endpoint_.slept()) progress_.noteSleep();
   return hasEvent && !stopped();
+}
+
+ServerCore::Run::Run(ServerCore& core) : core_(core) {
+  core.endpoint_.forkGuard().check("MessageServer");
+  std::thread::id runner;
+  const auto self = std::this_thread::get_id();
+  isOutermost_ = core.runner_.compare_exchange_strong(runner, self, std::memory_order_relaxed);
+  if (!isOutermost_ && runner != self)
+    throw std::logic_error(fmt::format(
+        "MessageServer::run(): another thread runs the server \"{}\" already", core.name()));
+}
+
+ServerCore::Run::~Run() {
+  if (isOutermost_) core_.runner_.store(std::thread::id(), std::memory_order_relaxed);
 }
 
 void ServerCore::interrupt() noexcept {

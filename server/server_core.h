@@ -15,6 +15,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include <mpf/message.h>
@@ -83,6 +84,20 @@ class ServerCore {
   void keepReadable() noexcept;
   void countAlarm() noexcept { endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed); }
 
+  // Exists while a thread is in MessageServer::run(). A handler may call it again.
+  //   throws  std::logic_error when another thread is in it, and in the child of a fork
+  class Run {
+   public:
+    explicit Run(ServerCore& core);
+    ~Run();
+    Run(const Run&) = delete;
+    Run& operator=(const Run&) = delete;
+
+   private:
+    ServerCore& core_;
+    bool isOutermost_ = false;
+  };
+
   struct Counts {
     std::uint32_t queueSize;
     std::uint64_t inQueue, requests, queueFull, replies;
@@ -127,6 +142,7 @@ class ServerCore {
   Handlers handlers_;
   std::int64_t takeBeforeNs_ = 0;  // of the request received last; 0: never
   std::atomic<bool> stop_{false};
+  std::atomic<std::thread::id> runner_{};  // the thread that is in run()
   bool hasDescriptor_ = false;
 };
 

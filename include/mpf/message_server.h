@@ -119,7 +119,8 @@ class MessageServer {
   //   throws  what the callback of onClient() throws; std::logic_error in the child of a fork
   Message receive();
   // Ends the call of waitForMessage() or run() that is in progress, or else the next one; waiting
-  // requests stay in their queues. Any thread; async-signal-safe.
+  // requests stay in their queues. In a handler, waitForMessage() returns false from then on, and
+  // run() ends after the handler. Any thread; async-signal-safe.
   void interrupt() noexcept;
   // Returns a number for the connection that `request` was received on; 0 when it is closed. Two
   // connections of this server never have the same number.
@@ -261,7 +262,8 @@ class MessageServer {
   }
   // Handles requests until interrupt(), which takes effect between two calls of a handler. Refuses
   // requests of a type that has no handler.
-  //   throws  what a handler throws; the other requests wait until run() is called again
+  //   throws  what a handler throws; the other requests wait until run() is called again;
+  //           std::logic_error when another thread is in run()
   void run();
   // As run(), until SIGINT or SIGTERM. Returns the exit status of a program: 0.
   int runUntilSignal();

@@ -10,6 +10,8 @@
 #include <memory>
 #include <span>
 #include <stdexcept>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include "shm/handling.h"
@@ -125,6 +127,35 @@ TEST_F(ServerCoreTest, AnInterruptEndsOneWait) {
 
   EXPECT_TRUE(server_->wait(Deadline::never()));
   EXPECT_TRUE(server_->receive());
+}
+
+TEST_F(ServerCoreTest, AnInterruptEndsAWaitInAHandlerAndTheOneOfItsCaller) {
+  server_->callHandler([&] {
+    server_->interrupt();
+    EXPECT_FALSE(server_->wait(Deadline::never()));
+    EXPECT_FALSE(server_->wait(Deadline::never()));
+  });
+
+  EXPECT_TRUE(server_->isInterrupted());
+  EXPECT_FALSE(server_->wait(Deadline::never()));
+  EXPECT_FALSE(server_->isInterrupted());
+}
+
+TEST_F(ServerCoreTest, OneThreadAtATimeRunsAServer) {
+  std::optional<ServerCore::Run> run(std::in_place, *server_);
+  const ServerCore::Run inAHandler(*server_);
+  const auto whyOfAnother = [&] {
+    std::string why;
+    std::thread([&] {
+      why = whatOf<std::logic_error>([&] { const ServerCore::Run another(*server_); });
+    }).join();
+    return why;
+  };
+
+  EXPECT_THAT(whyOfAnother(), testing::HasSubstr("\"server\""));
+  run.reset();
+
+  EXPECT_EQ(whyOfAnother(), "");
 }
 
 TEST_F(ServerCoreTest, NotesTheTimeOfTheFirstRequestAfterASleep) {
