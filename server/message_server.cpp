@@ -92,6 +92,10 @@ void MessageServer::setRunHandler(MessageType type, std::size_t size,
   core_->handlers().set(type, std::move(forMessage), std::move(forRun));
 }
 
+void MessageServer::refuseEmptyHandler(std::string_view type) {
+  throw std::invalid_argument(fmt::format("MessageServer::on(): the handler of {} is empty", type));
+}
+
 bool MessageServer::handleOne() {
   bool hasHandledRun = false;
   if (auto request = core_->receiveOrHandleRun(hasHandledRun)) handle(std::move(request));

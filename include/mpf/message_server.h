@@ -16,6 +16,7 @@
 // Threads  one thread waits and receives; any thread may call reply(), replyMany(),
 //          allocReplyMessage(), allocShared(), publish(), refuse(), isClientConnected(),
 //          countAlarm() and interrupt().
+//          A handler must not destroy its server.
 // Fork     in the child of a fork, the parent's servers refuse to work: waitForMessage(), receive()
 //          and what calls them, descriptor(), setQueueSize() and report() throw std::logic_error;
 //          reply(), replyMany() and publish() return clientGone, clientOf() 0, isClientConnected()
@@ -38,12 +39,14 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <mpf/backplane.h>
 #include <mpf/clock.h>
+#include <mpf/detail/handler_argument.h>
 #include <mpf/message_of.h>
 #include <mpf/rights.h>
 #include <mpf/wait_mode.h>
@@ -123,7 +126,9 @@ class MessageServer {
   // run() ends after the handler. Any thread; async-signal-safe.
   void interrupt() noexcept;
   // Returns a number for the connection that `request` was received on; 0 when it is closed. Two
-  // connections of this server never have the same number.
+  // connections of this server never have the same number. A handle that was emptied, by reply() or
+  // because its message was moved, still names its request: here and for isClientConnected(),
+  // allocReplyMessage() and replyMany() with values, which send further replies then.
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
   // Whether that client is still connected and alive. Any thread, also during a handler: clientOf()
   // notices a dead client only when the thread of the server has called receive() again.
@@ -150,7 +155,10 @@ class MessageServer {
   // Sends `message` to the client whose request it replies to. `message` is a request, changed or
   // not, or was made by allocReplyMessage(). sent and clientGone empty it; the other results leave
   // it unchanged. The first reply ends the request. Further replies are refused with queueFull when
-  // the client does not take them. Any thread; never waits.
+  // the client does not take them: at least 16 may wait, and at least an eighth of
+  // ServerOptions::queueSize, if their bodies have up to 24 bytes or more than 192; those between
+  // count as up to four. With the default of 100, 47 may wait after the first reply.
+  // Any thread; never waits.
   ReplyResult reply(Message&& message);
   // Sends replies in order, as reply() does, and stops at the first that is not sent. Those whose
   // client is gone are skipped and counted. A sleeping client is woken at most once for consecutive
@@ -164,7 +172,8 @@ class MessageServer {
   //
   // The first reply ends the request, as with reply(). A sleeping client is woken once for up to
   // 1024 values. Any thread; never waits.
-  //   request  stays with the caller, who can reply to it again
+  //   request  stays with the caller, who can reply to it again; or a handle that it was moved out
+  //            of, or that reply() has emptied: see clientOf()
   //   values   with ServerOptions::stampsReplies, up to 1024 consecutive ones share a time stamp
   //   returns  the number of values that were sent; `result` is clientGone when the client is gone
   template <ScalarBody T>
@@ -204,7 +213,8 @@ class MessageServer {
   // Message::getMissed().
   //
   //   message   keeps its contents, and may be published again, to these or other requests
-  //   requests  unchanged; a request of another server, or an empty handle, gives clientGone
+  //   requests  unchanged; a request of another server, or an empty handle, also one that was moved
+  //             from or replied to, gives clientGone
   //   results   out: the result for each request; may be shorter, and is then filled as far as it
   //             goes
   //   returns   the number of results `sent`
@@ -229,36 +239,27 @@ class MessageServer {
   //                    comes alone if it has a deadline, or T is neither Int32 nor OutOfBand. While
   //                    both sides poll, this handles more requests per second than T&; with
   //                    WaitMode::block, fewer
+  //
+  // A handler returns void. The compiler refuses other handlers, also those that take a copy or a
+  // const reference: their changes would not reach the client.
+  //   throws  std::invalid_argument when `handler` is an empty std::function or a null pointer
   template <MessageBody T, class Handler>
   void on(Handler handler) {
-    setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
-      if constexpr (std::is_invocable_v<Handler&, T&>) {
-        auto* const fields = message.tryAs<T>();
-        if (fields == nullptr) return refuse(std::move(message));
-        handler(*fields);
-        static_cast<void>(reply(std::move(message)));
-      } else {
-        auto typed = MessageOf<T>::tryFrom(std::move(message));
-        if (!typed)
-          // NOLINTNEXTLINE(bugprone-use-after-move): tryFrom() has left it unchanged
-          return refuse(std::move(message));
-        if constexpr (std::is_invocable_v<Handler&, MessageOf<T>&>) {
-          handler(*typed);
-          static_cast<void>(reply(std::move(*typed)));
-        } else {
-          handler(std::move(*typed));
-        }
-      }
-    });
-  }
-  template <ScalarBody T, class Handler>
-    requires(!std::is_invocable_v<Handler&, T&> && std::is_invocable_v<Handler&, std::span<T>>)
-  void on(Handler handler) {
-    setRunHandler(
-        T::kType, sizeof(T), &fieldsOf<T>,
-        [handler = std::move(handler)](std::span<std::byte> values) mutable {
-          handler(std::span(reinterpret_cast<T*>(values.data()), values.size() / sizeof(T)));
-        });
+    static_assert(!std::is_same_v<T, Connect> && !std::is_same_v<T, RequestFate>,
+                  "Connect and RequestFate are notifications for the callback of a client, and "
+                  "never requests");
+    using Argument = detail::HandlerArgument<T, Handler>;
+    static_assert(!std::is_void_v<Argument>,
+                  "the handler takes T& (a reference: the changed request is the reply), "
+                  "MessageOf<T>&, MessageOf<T>&& or, if T is a scalar, std::span<T>");
+    if constexpr (!std::is_void_v<Argument>) {
+      static_assert(std::is_void_v<std::invoke_result_t<Handler&, Argument>>,
+                    "a handler returns void: its result would be ignored; to tell it to the "
+                    "client, set a field of the request, for example `status`");
+      if (detail::isEmptyHandler(handler)) refuseEmptyHandler(T::kName);
+      if constexpr (std::is_same_v<Argument, std::span<T>>) setSpanHandler<T>(std::move(handler));
+      else setTypedHandler<T, Argument>(std::move(handler));
+    }
   }
   // Handles requests until interrupt(), which takes effect between two calls of a handler. Refuses
   // requests of a type that has no handler.
@@ -295,6 +296,37 @@ class MessageServer {
 
  private:
   friend class RelayServer;  // internal, for routers
+  [[noreturn]] static void refuseEmptyHandler(std::string_view type);
+  template <MessageBody T, class Argument, class Handler>
+  void setTypedHandler(Handler handler) {
+    setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
+      if constexpr (std::is_same_v<Argument, T&>) {
+        auto* const fields = message.tryAs<T>();
+        if (fields == nullptr) return refuse(std::move(message));
+        handler(*fields);
+        static_cast<void>(reply(std::move(message)));
+      } else {
+        auto typed = MessageOf<T>::tryFrom(std::move(message));
+        if (!typed)
+          // NOLINTNEXTLINE(bugprone-use-after-move): tryFrom() has left it unchanged
+          return refuse(std::move(message));
+        if constexpr (std::is_same_v<Argument, MessageOf<T>&>) {
+          handler(*typed);
+          static_cast<void>(reply(std::move(*typed)));
+        } else {
+          handler(std::move(*typed));
+        }
+      }
+    });
+  }
+  template <ScalarBody T, class Handler>
+  void setSpanHandler(Handler handler) {
+    setRunHandler(
+        T::kType, sizeof(T), &fieldsOf<T>,
+        [handler = std::move(handler)](std::span<std::byte> values) mutable {
+          handler(std::span(reinterpret_cast<T*>(values.data()), values.size() / sizeof(T)));
+        });
+  }
   void setHandler(MessageType type, std::function<void(Message&&)> handler);
   // A handler of values of `size` bytes each, which lie one after the other.
   //   fields  returns the value of a request, without a body if the request is invalid

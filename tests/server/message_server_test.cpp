@@ -2,7 +2,9 @@
 // MessageServer: arguments that it refuses. The tests of clients show how it serves them.
 #include <mpf/message_server.h>
 
+#include <functional>
 #include <gtest/gtest.h>
+#include <span>
 #include <stdexcept>
 
 #include "tests/support/test_backplane.h"
@@ -31,6 +33,16 @@ TEST(MessageServerTest, InvalidRightsAreAnError) {
   const TestBackplane backplane;
 
   EXPECT_THROW(MessageServer(backplane, "server", {.rights = {.mode = 0}}), std::invalid_argument);
+}
+
+TEST(MessageServerTest, AnEmptyHandlerIsAnError) {
+  const TestBackplane backplane;
+  MessageServer server(backplane, "server");
+
+  EXPECT_THROW(server.on<Int32>(std::function<void(Int32&)>()), std::invalid_argument);
+  EXPECT_THROW(server.on<Int32>(std::function<void(std::span<Int32>)>()), std::invalid_argument);
+  EXPECT_THROW(server.on<Int32Array>(static_cast<void (*)(Int32ArrayMessage&)>(nullptr)),
+               std::invalid_argument);
 }
 
 TEST(MessageServerTest, AReplyWithoutARequestIsNotSent) {

@@ -58,7 +58,7 @@ PUBLIC_HEADERS = {
     ],
     "shm": ["wait_mode.h", "rights.h", "errors.h", "backplane.h"],
     "client": ["dispatcher.h", "message_client.h", "sync_client.h"],
-    "server": ["message_server.h"],
+    "server": ["message_server.h", "detail/handler_argument.h"],
     "classic/messages": ["classic/message.h"],
     "classic": [
         "classic.h",
