@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "router/arguments.h"
 
+#include <fcntl.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -44,12 +46,21 @@ Remote parseRemote(const std::string& text) {
   if (equals == std::string::npos)
     throw std::invalid_argument(fmt::format("\"{}\": write LOCATION[,LOCATION]=HOST:PORT", text));
   Remote remote;
-  for (std::size_t begin = 0, end = 0; end < equals; begin = end + 1) {
+  for (std::size_t begin = 0, end = 0; begin <= equals; begin = end + 1) {
     end = std::min(text.find(',', begin), equals);
     remote.locations.push_back(parseLocation(std::string_view(text).substr(begin, end - begin)));
   }
   remote.address = parseAddress(text.substr(equals + 1));
   return remote;
+}
+
+// Returns why nothing can be written to a descriptor; an empty text if it is open for writing. The
+// router has not opened any of its own yet.
+std::string explainUnusable(const std::string& descriptor) {
+  const auto number = tryNumber<int>(descriptor);
+  const int flags = number ? ::fcntl(*number, F_GETFL) : -1;
+  if (flags >= 0 && (flags & O_ACCMODE) != O_RDONLY) return {};
+  return fmt::format("{}: not a descriptor that is open for writing", descriptor);
 }
 
 // Calls `function` and reports an invalid value as an error of `option`.
@@ -114,7 +125,8 @@ std::optional<int> RouterArguments::start(int argc, const char* const* argv) {
   app.add_flag("--check", checkOnly_, "Check the configuration, print its meaning, and exit");
   app.add_option("--ready-fd", readyDescriptor_,
                  "Write the listening addresses to this descriptor, one per line, and close it")
-      ->type_name("FD");
+      ->type_name("FD")
+      ->check(explainUnusable);
   app.footer(kFooter);
   if (const auto status = parseCommandLine(app, argc, argv)) return status;
   try {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/number.h"
+#include "base/printable.h"
 #include "shm/layout.h"
 
 namespace mpf {
@@ -69,7 +70,7 @@ void SegmentName::checkBackplane(std::string_view backplane) {
   if (!isBackplane(backplane)) {
     throw std::invalid_argument(
         fmt::format("backplane name \"{}\": use 1 to {} of the characters A-Z a-z 0-9 _ -",
-                    backplane, layout::kBackplaneChars - 1));
+                    printable(backplane), layout::kBackplaneChars - 1));
   }
 }
 
@@ -78,8 +79,8 @@ void SegmentName::checkServer(std::string_view server) {
   if (server.empty() || server.size() >= layout::kNameChars ||
       std::any_of(server.begin(), server.end(), isControl)) {
     throw std::invalid_argument(
-        fmt::format("server name \"{}\": use 1 to {} bytes without control characters", server,
-                    layout::kNameChars - 1));
+        fmt::format("server name \"{}\": use 1 to {} bytes without control characters",
+                    printable(server), layout::kNameChars - 1));
   }
 }
 

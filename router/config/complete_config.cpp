@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 #include <set>
 
+#include "base/printable.h"
 #include "router/config/tls_files.h"
 #include "router/config/written_config.h"
 #include "shm/segment_name.h"
@@ -53,11 +54,12 @@ class Completion {
         std::ranges::all_of(config_.name, [](char c) { return c >= ' ' && c <= '~'; });
     if (config_.name.size() > kLongestRouterName || !isPrintable) {
       refuse(root.of("name"), fmt::format("name \"{}\": use 1 to {} printable characters",
-                                          config_.name, kLongestRouterName));
+                                          printable(config_.name), kLongestRouterName));
     }
     if (std::ranges::find(kLogLevels, config_.logLevel) == kLogLevels.end()) {
-      refuse(root.of("log-level"), fmt::format("log-level \"{}\": use {}", config_.logLevel,
-                                               fmt::join(kLogLevels, ", ")));
+      refuse(root.of("log-level"),
+             fmt::format("log-level \"{}\": use {}", printable(config_.logLevel),
+                         fmt::join(kLogLevels, ", ")));
     }
     constexpr mode_t kGroupReadsAndWrites = 0060;
     if (config_.rights.group != Rights().group &&

@@ -136,6 +136,9 @@ TEST_F(ArgumentsTest, AreNamedInErrors) {
       {{"--serve", "1="}, "--serve: \"\" is not a location: write an integer"},
       {{"--remote", "ioc1:9900"}, "--remote: \"ioc1:9900\": write LOCATION[,LOCATION]=HOST:PORT"},
       {{"--remote", "1,=ioc1:9900"}, "--remote: \"\" is not a location: write an integer"},
+      {{"--remote", "=127.0.0.1:5"}, "--remote: \"\" is not a location: write an integer"},
+      {{"--ready-fd", "99"}, "--ready-fd: 99: not a descriptor that is open for writing"},
+      {{"--ready-fd=-1"}, "--ready-fd: -1: not a descriptor that is open for writing"},
       {{"--remote", "1=ioc1"},
        "--remote: \"ioc1\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, "
        "[fd00::7]:9900 or, to listen, *:9900"},

@@ -2,6 +2,7 @@
 // SegmentName: builds, parses and refuses names in /dev/shm.
 #include <set>
 
+#include "base/printable.h"
 #include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
@@ -80,8 +81,11 @@ TEST(SegmentName, RefusesAnInvalidBackplaneNameAndNamesIt) {
   for (const std::string wrong : {"a.b", "a/b", "../x", "a b", "\xc3\xa9", "a\n", "[0]",
                                   "012345678901234567890123456789012345678-"}) {
     const auto why = whatOf<std::invalid_argument>([&] { SegmentName::checkBackplane(wrong); });
-    EXPECT_THAT(why, testing::HasSubstr("\"" + wrong + "\""));
+    EXPECT_THAT(why, testing::HasSubstr("\"" + printable(wrong) + "\""));
   }
+  EXPECT_THAT(whatOf<std::invalid_argument>(
+                  [] { SegmentName::checkBackplane(std::string_view("a\0b", 3)); }),
+              testing::HasSubstr("\"a\\x00b\""));
   EXPECT_THROW(SegmentName::checkBackplane(""), std::invalid_argument);
   EXPECT_NO_THROW(SegmentName::checkBackplane("A-z_09"));
 }
@@ -89,7 +93,7 @@ TEST(SegmentName, RefusesAnInvalidBackplaneNameAndNamesIt) {
 TEST(SegmentName, RefusesAnInvalidServerNameAndNamesIt) {
   for (const std::string wrong : {"a\nb", "\x7f", "\t", "a\x01"}) {
     EXPECT_THAT(whatOf<std::invalid_argument>([&] { SegmentName::checkServer(wrong); }),
-                testing::HasSubstr("\"" + wrong + "\""));
+                testing::HasSubstr("\"" + printable(wrong) + "\""));
   }
   EXPECT_THROW(SegmentName::checkServer(""), std::invalid_argument);
   EXPECT_THROW(SegmentName::checkServer(std::string(layout::kNameChars, 'x')),

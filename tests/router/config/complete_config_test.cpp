@@ -51,7 +51,7 @@ TEST_F(CompleteConfigTest, InvalidValues) {
        "1: the mode gives this group no access; write mode 0660, too"},
       {"log-level = \"loud\"\n" + kRemote,
        "1: log-level \"loud\": use trace, debug, info, warning, error, critical, off"},
-      {"\nname = \"a\\tb\"\n" + kRemote, "2: name \"a\tb\": use 1 to 63 printable characters"},
+      {"\nname = \"a\\tb\"\n" + kRemote, "2: name \"a\\tb\": use 1 to 63 printable characters"},
       {"backplane = \"a.b\"\n" + kRemote,
        "1: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -"},
       {"[limits]\nfirst-retry = \"9s\"\n" + kRemote,
