@@ -21,6 +21,8 @@
 #include <string>
 #include <vector>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 class Watcher;  // internal

@@ -19,6 +19,8 @@
 #include <compare>
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 // The unit of all durations of the public API; other units of std::chrono convert implicitly.

@@ -37,6 +37,8 @@
 
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf::digital {
 
 // NOLINTBEGIN(readability-identifier-naming): names of the original MPF

@@ -11,6 +11,8 @@
 
 #include <stdexcept>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 // Another process uses this name: in most cases it runs a server of the same name at the same

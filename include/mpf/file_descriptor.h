@@ -14,6 +14,8 @@
 
 #include <utility>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 class FileDescriptor {

@@ -32,6 +32,8 @@
 
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf::gpib {
 
 // NOLINTBEGIN(readability-identifier-naming): same style as the names of serial_commands.h

@@ -15,6 +15,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf::ip330server {
 
 // NOLINTBEGIN(readability-identifier-naming): names of the EPICS modules ip330, mca and std

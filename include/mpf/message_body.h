@@ -14,6 +14,8 @@
 
 #include <cstddef>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 // Owns the memory of out-of-line bodies and outlives every handle that uses that memory.

@@ -12,6 +12,8 @@
 
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 struct Route;

@@ -35,6 +35,8 @@
 #include <tuple>
 #include <type_traits>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 // The number of a type, in shared memory. Numbers are never reused. A newer peer may send a number

@@ -24,6 +24,8 @@
 
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 // The priority of threads that serve interrupts: above all ordinary threads, below the kernel's

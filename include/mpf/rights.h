@@ -12,6 +12,8 @@
 
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 //   mode   permission bits, as for chmod(2): the read and write bits of user, group and others, at

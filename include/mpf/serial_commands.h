@@ -20,6 +20,8 @@
 
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf::serial {
 
 // NOLINTBEGIN(readability-identifier-naming): names of the manual

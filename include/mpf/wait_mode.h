@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf {
 
 // The numbers are part of the layout of the shared memory.

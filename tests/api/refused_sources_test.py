@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Handlers that MessageServer::on() accepts compile; mistakes do not, and the error says why.
+"""Handlers that MessageServer::on() accepts compile; mistakes do not, and the error says why. An
+older standard than C++20 is named in the first error.
 
 usage: refused_sources_test.py SOURCE_FOLDER COMPILER
 """
@@ -66,22 +67,30 @@ ACCEPTED = """
 """
 
 
-def errors_of(source, folder, compiler):
+HEADERS = ["message_client.h", "message_server.h", "sync_client.h", "message_of.h", "rights.h"]
+
+
+def errors_of(source, folder, compiler, standard="c++20"):
     """What the compiler writes; empty if the source compiles."""
-    command = [compiler, "-std=c++20", "-fsyntax-only", "-I", folder + "/include", "-x", "c++", "-"]
-    done = subprocess.run(command, input=SOURCE % source, capture_output=True, text=True)
+    options = ["-std=" + standard, "-fsyntax-only", "-I", folder + "/include", "-x", "c++", "-"]
+    done = subprocess.run([compiler, *options], input=source, capture_output=True, text=True)
     return done.stderr if done.returncode != 0 else ""
 
 
 def main(folder, compiler):
     failures = []
-    if errors := errors_of(ACCEPTED, folder, compiler):
+    if errors := errors_of(SOURCE % ACCEPTED, folder, compiler):
         failures.append("does not compile:\n" + errors)
     for source, why in REFUSED:
-        errors = errors_of(source, folder, compiler)
+        errors = errors_of(SOURCE % source, folder, compiler)
         if errors.count("error:") != 1 or why not in errors:
             failures.append(f"{source}\n  is not refused with the only error: {why}\n{errors}")
-    print("\n".join(failures) or f"{len(REFUSED)} sources were refused")
+    for header in HEADERS:
+        errors = errors_of(f"#include <mpf/{header}>\n", folder, compiler, "c++17")
+        first = next((line for line in errors.splitlines() if "error:" in line), "no error")
+        if "MPF needs C++20" not in first:
+            failures.append(f"<mpf/{header}> with C++17: the first error is: {first}")
+    print("\n".join(failures) or f"{len(REFUSED) + len(HEADERS)} sources were refused")
     return 1 if failures else 0
 
 

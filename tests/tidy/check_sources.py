@@ -40,20 +40,12 @@ MAY_INCLUDE_ANYTHING = ("tests", "benchmarks", "examples")
 # The folder whose sources define what a public header declares. Headers in
 # include/mpf/drivers/ belong to drivers.
 PUBLIC_HEADERS = {
-    "base": ["clock.h", "file_descriptor.h", "real_time_priority.h", "detail/copy_words.h"],
+    "base": ["clock.h", "file_descriptor.h", "real_time_priority.h", "detail/copy_words.h",
+             "detail/cpp20.h"],
     "schema": [
-        "message_types.h",
-        "message_layout.h",
-        "message_route.h",
-        "message_body.h",
-        "message.h",
-        "message_of.h",
-        "user_message.h",
-        "serial_commands.h",
-        "serial_sniff.h",
-        "gpib_commands.h",
-        "gpib_sniff.h",
-        "digital_io_commands.h",
+        "message_types.h", "message_layout.h", "message_route.h", "message_body.h",
+        "message.h", "message_of.h", "user_message.h", "serial_commands.h",
+        "serial_sniff.h", "gpib_commands.h", "gpib_sniff.h", "digital_io_commands.h",
         "ip330_commands.h",
     ],
     "shm": ["wait_mode.h", "rights.h", "errors.h", "backplane.h"],

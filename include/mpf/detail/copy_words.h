@@ -25,6 +25,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include <mpf/detail/cpp20.h>
+
 namespace mpf::detail {
 
 // The same value, which the compiler must have in a register of its own: it may not load two
