@@ -245,7 +245,7 @@ class MessageServer {
   //   throws  std::invalid_argument when `handler` is an empty std::function or a null pointer
   template <MessageBody T, class Handler>
   void on(Handler handler) {
-    static_assert(!std::is_same_v<T, Connect> && !std::is_same_v<T, RequestFate>,
+    static_assert(!detail::kIsNotification<T>,
                   "Connect and RequestFate are notifications for the callback of a client, and "
                   "never requests");
     using Argument = detail::HandlerArgument<T, Handler>;

@@ -42,9 +42,13 @@ class EchoThread {
   EchoThread& operator=(const EchoThread&) = delete;
 
  private:
+  template <class T>
+  void echo(std::type_identity<T> /*type*/) {
+    if constexpr (!detail::kIsNotification<T>) server_.on<T>([](MessageOf<T>&) {});
+  }
   template <class... T>
   void echo(std::type_identity<std::tuple<T...>> /*types*/) {
-    (server_.on<T>([](MessageOf<T>&) {}), ...);
+    (echo(std::type_identity<T>()), ...);
   }
   MessageServer server_;
   std::thread thread_;

@@ -29,11 +29,14 @@ Echo::Echo(const Backplane& backplane, const std::string& name, World& world, Wa
     : world_(world),
       server_(backplane, name,
               {.location = 0, .queueSize = 40, .waitMode = waitMode, .maxBorrowed = 64}) {
-  [this]<class... T>(std::type_identity<std::tuple<T...>>) {
-    (server_.on<T>([this](MessageOf<T>&&) {
-      world_.complain("a server received a message of a type that no client sends");
-    }),
-     ...);
+  const auto complain = [this]<class T>(std::type_identity<T>) {
+    if constexpr (!detail::kIsNotification<T>)
+      server_.on<T>([this](MessageOf<T>&&) {
+        world_.complain("a server received a message of a type that no client sends");
+      });
+  };
+  [&]<class... T>(std::type_identity<std::tuple<T...>>) {
+    (complain(std::type_identity<T>()), ...);
   }(std::type_identity<MessageTypes>{});
   server_.on<Int32>([this](Int32Message&& request) { answer(std::move(request)); });
   server_.on<Float64Array>([this](Float64ArrayMessage&& request) { answer(std::move(request)); });

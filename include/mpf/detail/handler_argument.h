@@ -43,6 +43,11 @@ template <class F>
   requires requires { &F::operator(); }
 struct ParameterOf<F> : ParameterOf<decltype(&F::operator())> {};
 
+// Whether T is a notification for the callback of a client: a server sends it, and handles none.
+template <class T>
+inline constexpr bool kIsNotification =
+    std::is_same_v<T, Connect> || std::is_same_v<T, RequestFate>;
+
 // Whether a handler with this parameter cannot change the request that is sent as the reply.
 template <class T, class Parameter>
 inline constexpr bool kLosesChanges =
