@@ -43,17 +43,15 @@ void stop(int) {
   errno = savedErrno;
 }
 
-// The child of a fork does not have the parent's other threads: none of them executes stop(), or
-// holds the mutex.
-void watchForks() {
-  const auto lock = [] { installMutex.lock(); };
-  const auto unlock = [] { installMutex.unlock(); };
-  const auto unlockInChild = [] {
-    handling.store(0, std::memory_order_relaxed);
-    installMutex.unlock();
-  };
-  [[maybe_unused]] static const int once = ::pthread_atfork(lock, unlock, unlockInChild);
+// A fork waits until no thread holds the mutex: the child could never lock it again. The child does
+// not have the parent's other threads, so none of them executes stop().
+void lock() noexcept { installMutex.lock(); }
+void unlock() noexcept { installMutex.unlock(); }
+void unlockAlone() noexcept {
+  handling.store(0, std::memory_order_relaxed);
+  installMutex.unlock();
 }
+[[maybe_unused]] const int kForkHandlers = ::pthread_atfork(lock, unlock, unlockAlone);
 
 void install() {
   struct sigaction action{};
@@ -71,7 +69,6 @@ void uninstall() {
 }  // namespace
 
 StopSignals::StopSignals(Callback callback, void* argument) : slot_(0) {
-  watchForks();
   const std::lock_guard lock(installMutex);
   while (slot_ < slots.size() && slots[slot_].used.exchange(true, std::memory_order_relaxed))
     ++slot_;

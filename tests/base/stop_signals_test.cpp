@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "base/system_call.h"
+#include "tests/base/child_process.h"
 #include "tests/support/watchdog.h"
 
 namespace mpf::test {
@@ -77,34 +78,26 @@ TEST_F(StopSignalsTest, DestructorReturnsInAChildForkedDuringTheCallback) {
   EXPECT_EQ(status, 0);
 }
 
-// The destructor holds a mutex while it waits for the callback.
-TEST_F(StopSignalsTest, AChildForkedDuringADestructorMayCatchSignals) {
-  interruptOther([](void* test) noexcept {
-    auto& self = *static_cast<StopSignalsTest*>(test);
-    self.entered = true;
-    while (!self.mayLeave) ::usleep(1000);
-  });
-  std::thread destroying([this] { signals.reset(); });
-  std::thread releasing([this] {
-    ::usleep(20'000);  // so that a fork that does not wait for the destructor comes first
-    mayLeave = true;
-  });
-  ::usleep(5'000);
-
-  const auto child = checkCall(::fork(), "fork");
-  if (child == 0) {
-    ::alarm(60);
-    {
-      const StopSignals own([](void*) noexcept {}, nullptr);
+TEST_F(StopSignalsTest, AChildMayCreateOneWhileAnotherThreadOfItsParentDoes) {
+  entered = true;  // the thread of the fixture ends
+  std::atomic<bool> isOver{false};
+  std::thread creating([&isOver] {
+    while (!isOver) {
+      const StopSignals shortLived([](void*) noexcept {}, nullptr);
     }
-    ::_exit(0);
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  releasing.join();
-  destroying.join();
+  });
 
-  EXPECT_EQ(status, 0);
+  for (int i = 0; i < 100 && !HasFailure(); ++i) {
+    EXPECT_EQ(endOf([] {
+                ::alarm(60);  // the child does not have the thread that may hold a lock
+                const StopSignals own([](void*) noexcept {}, nullptr);
+                return 0;
+              }),
+              0);
+  }
+
+  isOver = true;
+  creating.join();
 }
 
 }  // namespace
