@@ -1,5 +1,5 @@
 # The installed tree: one library, its headers, mpf::mpf, mpf::classic, pkg-config mpf, the programs
-# and their man pages.
+# and their man pages, the documents and the examples.
 include(CMakePackageConfigHelpers)
 
 # Appends to `out` the targets that the CMakeLists of `folder` and below define, if their type is
@@ -106,7 +106,19 @@ file(RELATIVE_PATH upToPrefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 string(REGEX REPLACE "/$" "" upToPrefix "${upToPrefix}")
 configure_file(scripts/cmake/mpf.pc.in mpf.pc @ONLY)
 install(FILES "${CMAKE_BINARY_DIR}/mpf.pc" DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
-install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+# ---- documents and examples, in the folders in which their links find each other
+
+install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES benchmarks/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/benchmarks)
+install(DIRECTORY docs examples DESTINATION ${CMAKE_INSTALL_DOCDIR} USE_SOURCE_PERMISSIONS
+  PATTERN __pycache__ EXCLUDE)
+# Their links to include/mpf.
+file(RELATIVE_PATH installedHeaders "/${CMAKE_INSTALL_DOCDIR}/include"
+  "/${CMAKE_INSTALL_INCLUDEDIR}/mpf")
+file(MAKE_DIRECTORY "${CMAKE_BINARY_DIR}/doc/include")
+file(CREATE_LINK "${installedHeaders}" "${CMAKE_BINARY_DIR}/doc/include/mpf" SYMBOLIC)
+install(DIRECTORY "${CMAKE_BINARY_DIR}/doc/include" DESTINATION ${CMAKE_INSTALL_DOCDIR})
 # The tables of `make bench`.
 install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)
 
