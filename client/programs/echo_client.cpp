@@ -73,9 +73,7 @@ int callEchoServer(const EchoOptions& options, const EchoClient& echo) {
     const auto sentNs = Clock::nowNs();
     auto answer = client.call(echo.make(i, options.bytes), options.timeout);
     if (!answer) {
-      const auto why = client.client().notConnectedBecause();
-      statistics.fail(
-          fmt::format("message {}: {}{}{}", i, answer.why(), why.empty() ? "" : ": ", why));
+      statistics.fail(fmt::format("message {}: {}", i, answer.why()));
     } else if (!echo.isEcho(i, options.bytes, answer.message())) {
       statistics.fail(fmt::format("message {}: the reply differs from the message", i));
     } else {

@@ -42,7 +42,7 @@ def test_help_shows_the_arguments_of_call(client: type) -> None:
     assert "_call" not in text
     call = text[text.index(" call(") :].split("\n |  \n")[0]
     assert "call(self, message: " in call
-    assert "retry: if the server ends before it has received the request" in call
+    assert "retry: if the server ends before it has taken the request" in call
 
 
 @needs_mpf

@@ -123,7 +123,7 @@ class AsyncClient(_mpf.BaseClient):
             client.
         reply: the class of the reply, mpf.Message for any; by default that of the request, and
             Int32 for a SerialConfig.
-        retry: if the server ends before it has received the request, send it to the next server of
+        retry: if the server ends before it has taken the request, send it to the next server of
             this name. No request is executed twice by it.
         check: raise StatusError if the status of the reply is not 0, and UnexpectedReply if it is
             of another class. False: return any reply.

@@ -31,7 +31,7 @@ def own_name_explained(name: str) -> Generator[None]:
     try:
         yield
     except NameInUse as error:
-        if f"(pid {os.getpid()})" not in str(error):
+        if f", pid {os.getpid()} (" not in str(error):
             raise
         raise NameInUse(
             f"{name}: this process has a server of this name; its close() frees the name"
