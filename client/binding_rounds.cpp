@@ -15,7 +15,10 @@ void BindingRounds::add(Place&& place) {
   if (place.member_.mapped().binding->hasLeft()) return;
   auto& member = bindings_.insert(std::move(place.member_)).position->second;
   const bool wasComplete = std::exchange(isComplete_, false);
-  schedule(member, member.binding->takeReportedDueNs());
+  const auto dueNs = member.binding->takeReportedDueNs();
+  schedule(member, dueNs);
+  // The dispatcher may have seen the time before it knew the binding.
+  parts_.timer.wakeAt(dueNs);
   isComplete_ = wasComplete;
 }
 

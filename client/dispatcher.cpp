@@ -16,7 +16,13 @@ struct SharedDispatchers {
   std::map<std::string, std::weak_ptr<Dispatcher>> ofBackplanes;
 };
 
-constinit PerProcess<SharedDispatchers> sharedDispatchers;
+// Never destroyed: threads may use it while the process exits.
+union NeverDestroyed {
+  constexpr NeverDestroyed() noexcept : value() {}
+  ~NeverDestroyed() {}
+  PerProcess<SharedDispatchers> value;
+};
+constinit NeverDestroyed sharedDispatchers;
 
 }  // namespace
 
@@ -25,7 +31,7 @@ Dispatcher::Dispatcher(const Backplane& backplane, const DispatcherOptions& opti
 Dispatcher::~Dispatcher() { impl_->endThread(); }
 
 std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
-  auto& shared = sharedDispatchers.get();
+  auto& shared = sharedDispatchers.value.get();
   const std::lock_guard lock(shared.mutex);
   auto& known = shared.ofBackplanes[backplane.name()];
   auto dispatcher = known.lock();

@@ -88,6 +88,20 @@ TEST_F(BindingRoundsTest, ConnectTheWaitingBindingsInSteps) {
   EXPECT_FALSE(rounds_.resume());
 }
 
+// Another thread calls bind() while the constructor's command waits for the dispatcher's thread.
+TEST_F(BindingRoundsTest, ABindingThatIsAddedAfterItsTimeWasSeenIsDue) {
+  const auto late = std::make_shared<Binding>(parts_, [](Message&&) {});
+  bindings_.push_back(late);
+  late->setServer("dac", 0);
+  late->connectSoon();
+  rounds_.handleDue();
+  ASSERT_FALSE(parts_.timer.isDue());
+
+  rounds_.add(BindingRounds::Place(late));
+
+  EXPECT_TRUE(parts_.timer.isDue());
+}
+
 // A flood of names does not keep bindings from their turn.
 TEST_F(BindingRoundsTest, NamesThatAppearDuringARoundBeginTheNextOne) {
   constexpr int kPerStep = Round<Binding>::kPerStep;
