@@ -28,3 +28,13 @@ void* operator new(std::size_t bytes, const std::nothrow_t& /*tag*/) noexcept {
 }
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t /*bytes*/) noexcept { std::free(memory); }
+
+namespace mpf::test {
+
+LimitedMemory::LimitedMemory(int allocations) noexcept {
+  allocationsLeft = allocations;
+  isMemoryLimited = true;
+}
+LimitedMemory::~LimitedMemory() { allocationsLeft = kUnlimited; }
+
+}  // namespace mpf::test

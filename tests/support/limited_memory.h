@@ -20,11 +20,10 @@ inline std::atomic<bool> isMemoryLimited{true};  // false: no allocation fails
 // Limits the allocations of this thread in its scope.
 class LimitedMemory {
  public:
-  explicit LimitedMemory(int allocations) {
-    allocationsLeft = allocations;
-    isMemoryLimited = true;
-  }
-  ~LimitedMemory() { allocationsLeft = kUnlimited; }
+  // Not inline: a program that uses this class must get the operator new of this library, also
+  // where the run-time library of a sanitizer has one.
+  explicit LimitedMemory(int allocations) noexcept;
+  ~LimitedMemory();
   LimitedMemory(const LimitedMemory&) = delete;
   LimitedMemory& operator=(const LimitedMemory&) = delete;
 };
