@@ -118,6 +118,7 @@ TEST_F(NoMemoryTest, AClientOfASharedDispatcherIsDestroyedWithoutMemory) {
 }
 
 TEST_F(NoMemoryTest, AWatcherReportsANameLater) {
+  const auto failed = failedAllocations.load();
   std::atomic<int> calls{0};
   Watcher watcher(backplane_.name());
   const auto token = watcher.watchNames(NameKind::serverWindow, [&] {
@@ -128,7 +129,6 @@ TEST_F(NoMemoryTest, AWatcherReportsANameLater) {
   isMemoryLimited = true;
   while (calls == 0) std::this_thread::yield();
   const auto before = calls.load();
-  const auto failed = failedAllocations.load();
 
   const MessageServer second(backplane_, "second");
 
