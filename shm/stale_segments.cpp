@@ -44,6 +44,17 @@ Finding judgeKeyed(const std::string& name) {
   return {Verdict::dead, "its name no longer exists"};
 }
 
+// Whether the hints of a client window are of this version of the layout: then the window is, too,
+// and a header that says otherwise is invalid.
+bool hasHintsOfThisVersion(const std::string& window) noexcept try {
+  const auto parsed = SegmentName::tryParse(window);
+  return parsed && segments::tryReadHeader(
+                       SegmentName::keyed(parsed->backplane, NameKind::hints, parsed->incarnation),
+                       layout::SegmentKind::hints);
+} catch (const std::exception&) {
+  return false;
+}
+
 // For a window. A free lock proves nothing unless the file is a segment of a known version, or its
 // name contains an incarnation.
 //   window  what was found, if the file is a window of a known version
@@ -60,6 +71,8 @@ Finding judgeWindow(const std::string& name, layout::SegmentKind kind,
   return {Verdict::dead,
           fmt::format("no process holds the lock of {}; its owner was {}", name, owner)};
 } catch (const VersionError& error) {
+  if (kind == layout::SegmentKind::clientWindow && hasHintsOfThisVersion(name))
+    return judgeKeyed(name);
   return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
 } catch (const SegmentError& error) {
   if (kind == layout::SegmentKind::clientWindow) return judgeKeyed(name);

@@ -162,6 +162,18 @@ TEST_F(StaleSegmentsTest, DoesNotJudgeUnknownFiles) {
               HasSubstr("layout version 2; this program supports 1;"));
 }
 
+// A client may overwrite the header of its own window.
+TEST_F(StaleSegmentsTest, TheHintsOfAClientTellWhichVersionItsWindowHas) {
+  const auto window = keyed(NameKind::clientWindow, 7);
+  leave(window, SegmentKind::clientWindow, 0, layout::kMajor + 1);
+  EXPECT_EQ(judgementOf(window).verdict, Verdict::unknown);
+
+  leave(keyed(NameKind::hints, 7), SegmentKind::hints, 7);
+
+  EXPECT_EQ(judgementOf(window).verdict, Verdict::dead);
+  EXPECT_EQ(backplane_.removeDead().size(), 2U);
+}
+
 // A successor gets the name after the file was judged dead. The removal checks the lock again.
 TEST_F(StaleSegmentsTest, DoesNotRemoveASuccessorOfTheSameName) {
   leave(serverName(), SegmentKind::serverWindow, 0);
