@@ -228,9 +228,9 @@ void Watcher::readNames() {
   alignas(inotify_event) std::array<char, 4096> events;
   const auto got = ::read(names_.get(), events.data(), events.size());
   if (got <= 0) return;
-  areNamesLost_ = true;
+  const bool wereLost = std::exchange(areNamesLost_, true);
   const auto kinds = kindsIn(events.data(), static_cast<std::size_t>(got), backplane_);
-  const bool someLost = kinds.find('*') != std::string::npos;
+  const bool someLost = wereLost || kinds.find('*') != std::string::npos;
   notifyNames([&](NameKind kind) {
     return someLost || kinds.find(static_cast<char>(kind)) != std::string::npos;
   });
