@@ -24,19 +24,13 @@
 #include "server/relay_server.h"
 #include "shm/segment_name.h"
 #include "shm/window.h"
+#include "tests/support/needs_a_child.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
 using namespace std::chrono_literals;
-
-#ifdef __SANITIZE_THREAD__
-#define MPF_NEEDS_A_CHILD \
-  GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some"
-#else
-#define MPF_NEEDS_A_CHILD
-#endif
 
 // Runs in a child process, which exits without the destructors of this process, and together with
 // it.

@@ -13,6 +13,7 @@
 
 #include "tests/shm/child.h"
 #include "tests/support/limited_memory.h"
+#include "tests/support/needs_a_child.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/watchdog.h"
 
@@ -68,6 +69,7 @@ TEST_F(NoMemoryTest, TheConstructorThrows) {
 }
 
 TEST_F(NoMemoryTest, TheDeathOfAClientEndsItsConnection) {
+  MPF_NEEDS_A_CHILD;
   for (int allocations = 0; allocations < kMost; ++allocations) {
     auto [server, request] = serverOfAKilledClient();
 
@@ -86,6 +88,7 @@ TEST_F(NoMemoryTest, TheDeathOfAClientEndsItsConnection) {
 }
 
 TEST_F(NoMemoryTest, AServerEndsAfterTheDeathOfAClient) {
+  MPF_NEEDS_A_CHILD;
   for (int allocations = 0; allocations < kMost; ++allocations) {
     auto [server, request] = serverOfAKilledClient();
 
