@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "base/step.h"
+#include "base/thread_number.h"
 #include "shm/histogram.h"
 #include "shm/rights_text.h"
 #include "shm/segment_name.h"
@@ -91,8 +92,8 @@ bool ServerCore::wait(Deadline deadline) {
 
 ServerCore::Run::Run(ServerCore& core) : core_(core) {
   core.endpoint_.forkGuard().check("MessageServer");
-  std::thread::id runner;
-  const auto self = std::this_thread::get_id();
+  std::uint64_t runner = 0;
+  const auto self = threadNumber();
   isOutermost_ = core.runner_.compare_exchange_strong(runner, self, std::memory_order_relaxed);
   if (!isOutermost_ && runner != self)
     throw std::logic_error(fmt::format(
@@ -100,7 +101,7 @@ ServerCore::Run::Run(ServerCore& core) : core_(core) {
 }
 
 ServerCore::Run::~Run() {
-  if (isOutermost_) core_.runner_.store(std::thread::id(), std::memory_order_relaxed);
+  if (isOutermost_) core_.runner_.store(0, std::memory_order_relaxed);
 }
 
 void ServerCore::interrupt() noexcept {

@@ -15,7 +15,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include <mpf/message.h>
@@ -142,7 +141,7 @@ class ServerCore {
   Handlers handlers_;
   std::int64_t takeBeforeNs_ = 0;  // of the request received last; 0: never
   std::atomic<bool> stop_{false};
-  std::atomic<std::thread::id> runner_{};  // the thread that is in run()
+  std::atomic<std::uint64_t> runner_{0};  // threadNumber() of the one that is in run(); 0: none
   bool hasDescriptor_ = false;
 };
 

@@ -2,13 +2,11 @@
 #include "shm/window.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <fmt/format.h>
 #include <optional>
 #include <pwd.h>
@@ -24,16 +22,15 @@
 namespace mpf {
 namespace {
 
-// "user root", the owner of a file; "another user" when the file is gone.
-std::string userOf(const std::string& path) {
-  struct stat status{};
-  if (::lstat(path.c_str(), &status) != 0) return "another user";
+// "user root", the owner of a segment; "another user" when it is gone.
+std::string ownerOf(const std::string& name) {
+  const auto user = segments::userOf(name);
+  if (!user) return "another user";
   std::array<char, 4096> texts{};
   passwd entry{};
   passwd* found = nullptr;
-  ::getpwuid_r(status.st_uid, &entry, texts.data(), texts.size(), &found);
-  return found != nullptr ? fmt::format("user {}", found->pw_name)
-                          : fmt::format("user {}", status.st_uid);
+  ::getpwuid_r(*user, &entry, texts.data(), texts.size(), &found);
+  return found != nullptr ? fmt::format("user {}", found->pw_name) : fmt::format("user {}", *user);
 }
 
 // Opens the window that has the name that we want; nullopt if no file has this name. For any other
@@ -43,22 +40,15 @@ std::optional<Segment> openConflicting(const std::string& name, layout::SegmentK
 } catch (const std::system_error& error) {
   if (error.code().value() == EACCES)
     throw NameInUse(
-        fmt::format("{0}: belongs to {1}, and only that user can tell whether its process is "
-                    "alive; `mpf clean` "
-                    "as that user removes it if the process is dead",
-                    segments::path(name), userOf(segments::path(name))));
+        fmt::format("{}: belongs to {}, and only that user can tell whether its process is alive; "
+                    "`mpf clean` as that user removes it if the process is dead",
+                    segments::path(name), ownerOf(name)));
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 } catch (const SegmentError& error) {
   if (segments::probeOwner(name) == segments::Owner::alive)
     throw NameInUse(
         fmt::format("another program uses a file that is not a usable segment: {}", error.what()));
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
-}
-
-// The text in `field` of a header, up to the first null character.
-template <std::size_t length>
-std::string_view textOf(const std::array<char, length>& field) {
-  return {field.data(), ::strnlen(field.data(), length)};
 }
 
 // Returns if the conflicting window of a name has disappeared or is about to be removed. Otherwise
@@ -75,8 +65,8 @@ void checkConflict(const std::string& name, layout::SegmentKind kind, Deadline r
       throw NameInUse(fmt::format(
           "server \"{}\" at location {} is already running: {}, pid {} ({}); stop it, or "
           "use another name, location or backplane",
-          textOf(header.name), header.location, textOf(header.program), header.ownerPid,
-          segments::path(name)));
+          segments::text(header.name), header.location, segments::text(header.program),
+          header.ownerPid, segments::path(name)));
     case segments::Owner::dead:
       if (segments::removeIfOwnerless(name)) return;
       if (!reaperIsLate.hasPassed() &&
