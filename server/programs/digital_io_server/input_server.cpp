@@ -26,6 +26,7 @@ DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::st
   });
   logShortages(server_, *log_);
   subscription_ = io.subscribe([this](const DigitalIoChange& change) { enqueue(change); });
+  state_ = io.look();
   thread_.start(log, [this] { run(); }, std::move(failed));
 }
 
@@ -80,17 +81,17 @@ void DigitalInputServer::read(Int32& fields) {
   faults_.fault(toString(DigitalIoStatus::gone));
 }
 
-// Delivers earlier changes before it adds the monitor, which first gets the present inputs.
+// The monitor first gets the state after the last change that was delivered to the others: a change
+// may be reported between the look and deliver().
 void DigitalInputServer::start(Int32Message&& request) {
   const auto client = server_.clientOf(request);
   if (client == 0) return;  // the client has disconnected
-  const auto state = io_.look();
+  io_.look();
   deliver();
   if (const auto former = find(client); former != monitors_.end()) monitors_.erase(former);
   const auto mask = static_cast<std::uint32_t>(request->address);
   Monitor monitor{std::move(request), client, mask == 0 ? ~0U : mask};
-  if (send(monitor, state.inputs, monitor.mask & io_.kind().inputs, state.isThere))
-    monitors_.push_back(std::move(monitor));
+  if (send(monitor, monitor.mask & io_.kind().inputs)) monitors_.push_back(std::move(monitor));
   followCount();
 }
 
@@ -129,11 +130,13 @@ void DigitalInputServer::deliver() {
   }
   for (const auto& change : all) {
     note(change);
-    const bool isThere = change.kind != DigitalIoChange::Kind::gone;
-    const bool isForAll = !isThere || change.kind == DigitalIoChange::Kind::back;
+    using Kind = DigitalIoChange::Kind;
+    const bool isForAll = change.kind == Kind::gone || change.kind == Kind::back;
+    if (isForAll) state_.isThere = change.kind == Kind::back;
+    state_.inputs = change.inputs;
     std::erase_if(monitors_, [&](Monitor& monitor) {
-      return (isForAll || (change.changed & monitor.mask) != 0) &&
-             !send(monitor, change.inputs, change.changed & monitor.mask, isThere);
+      const auto changed = change.changed & monitor.mask;
+      return (isForAll || changed != 0) && !send(monitor, changed);
     });
   }
   followCount();
@@ -161,13 +164,12 @@ void DigitalInputServer::note(const DigitalIoChange& change) {
   server_.countAlarm();
 }
 
-bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
-                              bool isThere) {
+bool DigitalInputServer::send(Monitor& monitor, std::uint32_t changed) {
   if (monitor.unsent) changed |= static_cast<std::uint32_t>(monitor.unsent->address);
   return trySend(monitor, {.cmd = digital::cmdStartMonitor,
-                           .status = isThere ? 0 : -1,
+                           .status = state_.isThere ? 0 : -1,
                            .address = static_cast<std::int32_t>(changed),
-                           .value = static_cast<std::int32_t>(inputs)});
+                           .value = static_cast<std::int32_t>(state_.inputs)});
 }
 
 bool DigitalInputServer::trySend(Monitor& monitor, const Int32& fields) {

@@ -67,8 +67,7 @@ class DigitalInputServer {
   void deliver();
   void note(const DigitalIoChange& change);
   // Return false when the client is gone.
-  [[nodiscard]] bool send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
-                          bool isThere);
+  [[nodiscard]] bool send(Monitor& monitor, std::uint32_t changed);
   [[nodiscard]] bool trySend(Monitor& monitor, const Int32& fields);
   void sendAgain();
   [[nodiscard]] std::vector<Monitor>::iterator find(std::uint64_t client);
@@ -80,6 +79,7 @@ class DigitalInputServer {
   MessageServer server_;
   FaultNote faults_;  // of reads; used by the server's thread, as monitors_
   std::vector<Monitor> monitors_;
+  DigitalIo::State state_;  // after the last change that was delivered
   Deadline sendAgainAt_ = Deadline::never();  // never when all messages were sent
   std::mutex mutex_;
   std::deque<DigitalIoChange> changes_;  // under mutex_

@@ -73,6 +73,27 @@ TEST_F(DigitalIoServerTest, SendsChangesWhileAnotherClientReadsWithoutAPause) {
   model_->connect(5, {});
 }
 
+// The change comes before the monitor, with it, or after it. The witness gets each change.
+TEST_F(DigitalIoServerTest, LosesNoChangeWhileAMonitorStarts) {
+  start();
+  HardwareAsker witness(backplane_, "dioIn");
+  ASSERT_EQ(witness.ask({.cmd = cmdStartMonitor}).value, kAll);
+  for (std::uint32_t round = 0; round < 2000; ++round) {
+    const auto level = round % 2;
+    auto change = std::async(std::launch::async, [&] {
+      model_->setInputs(1, level);
+      io_->look();  // reports it while the server looks, too
+    });
+    auto inputs = in_.ask({.cmd = cmdStartMonitor}).value;
+    change.get();
+    static_cast<void>(witness.next());
+
+    ASSERT_EQ(in_.ask({.cmd = cmdStopMonitor}).status, 0);
+    while (const auto message = in_.client().receive(0s)) inputs = message.tryAs<Int32>()->value;
+    ASSERT_EQ(static_cast<std::uint32_t>(inputs) & 1, level) << "round " << round;
+  }
+}
+
 // The original MPF had one monitor: a second client replaced that of the first.
 TEST_F(DigitalIoServerTest, HasAnyNumberOfMonitors) {
   start();
