@@ -164,10 +164,11 @@ class Publisher {
 
 TEST_F(GeneralDeviceTest, ASubscriptionProcessesTheRecordForEachMessageAndIsRenewed) {
   std::optional<Publisher> server(std::in_place, backplane_, 10);
-  const Ioc ioc(longin("@s cmd=3", kIoInterrupt) +
-                "record(calc, \"count\") { field(INPA, \"v CPP\") field(CALC, \"VAL+1\") }\n");
+  const Ioc ioc(longin("@s cmd=3", std::string(kIoInterrupt) + " field(FLNK, \"count\")") +
+                "record(calc, \"count\") { field(CALC, \"VAL+1\") }\n");
   Ioc::waitFor("v", "11");
   EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+  EXPECT_EQ(Ioc::get("count"), "2");
   EXPECT_EQ(server->requests(), 1);
 
   server.reset();
@@ -176,6 +177,7 @@ TEST_F(GeneralDeviceTest, ASubscriptionProcessesTheRecordForEachMessageAndIsRene
 
   Ioc::waitFor("v", "21");
   EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+  EXPECT_EQ(Ioc::get("count"), "4");
 }
 
 TEST_F(GeneralDeviceTest, ASubscribedRecordThatProcessesSendsNothingAndKeepsItsValue) {
