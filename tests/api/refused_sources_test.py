@@ -6,13 +6,18 @@ older standard than C++20 is named in the first error.
 usage: refused_sources_test.py SOURCE_FOLDER COMPILER
 """
 
+import os
 import subprocess
 import sys
+import tempfile
 
-SOURCE = """
+INCLUDES = """
 #include <functional>
 #include <span>
 #include <mpf/message_server.h>
+"""
+
+SOURCE = """
 using namespace mpf;
 void set(MessageServer& server) {
   %s
@@ -70,26 +75,43 @@ ACCEPTED = """
 HEADERS = ["message_client.h", "message_server.h", "sync_client.h", "message_of.h", "rights.h"]
 
 
-def errors_of(source, folder, compiler, standard="c++20"):
+def errors_of(command, source=""):
     """What the compiler writes; empty if the source compiles."""
-    options = ["-std=" + standard, "-fsyntax-only", "-I", folder + "/include", "-x", "c++", "-"]
-    done = subprocess.run([compiler, *options], input=source, capture_output=True, text=True)
+    done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
     return done.stderr if done.returncode != 0 else ""
 
 
-def main(folder, compiler):
-    failures = []
-    if errors := errors_of(SOURCE % ACCEPTED, folder, compiler):
-        failures.append("does not compile:\n" + errors)
+def check_handlers(command, place):
+    """Yields what is wrong. The headers, which take longer than a handler, are compiled once."""
+    header = os.path.join(place, "headers.h")
+    with open(header, "w", encoding="utf-8") as file:
+        file.write(INCLUDES)
+    command = [*command, "-std=c++20"]
+    if errors := errors_of([*command, "-x", "c++-header", header]):
+        yield "does not compile:\n" + errors
+    command += ["-fsyntax-only", "-Werror=invalid-pch", "-include", header, "-x", "c++", "-"]
+    if errors := errors_of(command, SOURCE % ACCEPTED):
+        yield "does not compile:\n" + errors
     for source, why in REFUSED:
-        errors = errors_of(SOURCE % source, folder, compiler)
+        errors = errors_of(command, SOURCE % source)
         if errors.count("error:") != 1 or why not in errors:
-            failures.append(f"{source}\n  is not refused with the only error: {why}\n{errors}")
+            yield f"{source}\n  is not refused with the only error: {why}\n{errors}"
+
+
+def check_standard(command):
+    """Yields what is wrong."""
+    command = [*command, "-std=c++17", "-fsyntax-only", "-x", "c++", "-"]
     for header in HEADERS:
-        errors = errors_of(f"#include <mpf/{header}>\n", folder, compiler, "c++17")
+        errors = errors_of(command, f"#include <mpf/{header}>\n")
         first = next((line for line in errors.splitlines() if "error:" in line), "no error")
         if "MPF needs C++20" not in first:
-            failures.append(f"<mpf/{header}> with C++17: the first error is: {first}")
+            yield f"<mpf/{header}> with C++17: the first error is: {first}"
+
+
+def main(folder, compiler):
+    command = [compiler, "-I", folder + "/include"]
+    with tempfile.TemporaryDirectory() as place:
+        failures = [*check_handlers(command, place), *check_standard(command)]
     print("\n".join(failures) or f"{len(REFUSED) + len(HEADERS)} sources were refused")
     return 1 if failures else 0
 
