@@ -16,14 +16,14 @@ namespace mpf {
 // none or if Number cannot hold it.
 template <class Number>
 std::optional<Number> tryTakeNumber(std::string_view& text, int base = 10) noexcept {
-  const auto* const end = text.data() + text.size();
+  const auto* const begin = text.data();
+  const auto* const end = begin + text.size();
   Number number{};
   std::from_chars_result result{};
-  if constexpr (std::is_integral_v<Number>)
-    result = std::from_chars(text.data(), end, number, base);
-  else result = std::from_chars(text.data(), end, number);
+  if constexpr (std::is_integral_v<Number>) result = std::from_chars(begin, end, number, base);
+  else result = std::from_chars(begin, end, number);
   if (result.ec != std::errc()) return std::nullopt;
-  text.remove_prefix(static_cast<std::size_t>(result.ptr - text.data()));
+  text.remove_prefix(static_cast<std::size_t>(result.ptr - begin));
   return number;
 }
 

@@ -95,7 +95,7 @@ const toml::node* TomlTable::find(const char* key) {
 template <class Value>
 std::optional<Value> TomlTable::take(const char* key, const toml::node& node,
                                      const char* wanted) const {
-  if (const auto value = node.value_exact<Value>()) return *value;
+  if (auto value = node.value_exact<Value>()) return value;
   refuse(node, fmt::format("{} is {}; write {}", key, kindOf(node), wanted));
   return std::nullopt;
 }
