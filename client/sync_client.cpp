@@ -32,7 +32,9 @@ SyncClient::SyncClient(const Backplane& backplane, const std::string& server, st
 }
 
 void SyncClient::take(Message&& message) {
-  if (awaited_ != 0 && message.route().requestId == awaited_) {
+  const auto& route = message.route();
+  // A further reply may name the same id: that of a request 2^32 requests ago.
+  if (awaited_ != 0 && route.requestId == awaited_ && (route.flags & kEndsRequest) != 0) {
     awaited_ = 0;
     if (const auto* fate = message.tryAs<RequestFate>()) {
       answer_.emplace(fate->fate);

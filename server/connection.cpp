@@ -39,17 +39,23 @@ Connection::Pointer Connection::take() {
   return connection;
 }
 
+void Connection::beginGeneration() noexcept {
+  const BiasedLock::Guard guard(*lock);
+  ++generation;
+}
+
 // Gives requests that differ in more bits different places, up to the size at which the client must
 // use different ones. The client may have received a reply that another thread is still sending
 // under the lock: then the place becomes free.
 bool Connection::tryMakePlace(std::uint32_t requestId) noexcept try {
   const auto size = std::bit_ceil(channel->link().header().maxOutstanding);
-  std::vector<std::atomic<std::uint32_t>> larger(unanswered.size() == size ? 0 : size);
+  std::vector<std::atomic<std::uint64_t>> larger(unanswered.size() == size ? 0 : size);
   const BiasedLock::Guard guard(*lock);
   if (larger.empty()) return placeOf(requestId).load(std::memory_order_relaxed) == 0;
   for (const auto& place : unanswered) {
-    const auto id = place.load(std::memory_order_relaxed);
-    if (id != 0) larger[id % size].store(id, std::memory_order_relaxed);
+    const auto request = place.load(std::memory_order_relaxed);
+    if (request != 0)
+      larger[detail::firstOf(request) % size].store(request, std::memory_order_relaxed);
   }
   unanswered = std::move(larger);
   unansweredMask = size - 1;

@@ -57,12 +57,14 @@ Connection& Connections::add(std::uint32_t index, std::unique_ptr<Link> link) tr
   while (all_.size() <= index) all_.push_back(Connection::take());
   auto& connection = *all_[index];
   const auto incarnation = link->header().incarnation;
-  std::vector<std::atomic<std::uint32_t>> unanswered(std::bit_ceil(link->maxOutstanding()));
+  std::vector<std::atomic<std::uint64_t>> unanswered(std::bit_ceil(link->maxOutstanding()));
   auto channel = MessageLink::make(std::move(link), connection.lock);
   byLink_[incarnation] = &connection;
   {
     const BiasedLock::Guard lock(*connection.lock);
     connection.index = index;
+    connection.clientGeneration = connection.generation;
+    connection.lastId = 0;
     connection.timedId = 0;
     connection.unanswered = std::move(unanswered);
     connection.unansweredMask = static_cast<std::uint32_t>(connection.unanswered.size() - 1);
@@ -185,8 +187,12 @@ bool Connections::isConnected(const Route& request) noexcept {
 Route Connections::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
   const auto number = client >> 32;
   if (number == 0 || number > all_.size()) return {};
-  return {reinterpret_cast<std::uint64_t>(all_[number - 1].get()), requestId,
-          static_cast<std::uint32_t>(client), nullptr};
+  const Route route{reinterpret_cast<std::uint64_t>(all_[number - 1].get()), requestId,
+                    static_cast<std::uint32_t>(client), nullptr};
+  auto* const connection = Connection::tryOf(route);
+  if (connection == nullptr) return route;
+  const BiasedLock::Guard lock(*connection->lock);
+  return connection->isOpenFor(route) ? connection->routeTo(requestId) : route;
 }
 
 bool Connections::isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept {
@@ -194,7 +200,7 @@ bool Connections::isUnanswered(std::uint64_t client, std::uint32_t requestId) co
   auto* const connection = Connection::tryOf(route);
   if (connection == nullptr) return false;
   const BiasedLock::Guard lock(*connection->lock);
-  return connection->isOpenFor(route) && connection->isUnanswered(requestId);
+  return connection->isOpenFor(route) && connection->isUnanswered(route);
 }
 
 std::vector<std::uint32_t> Connections::unanswered(std::uint64_t client) const {
@@ -205,7 +211,8 @@ std::vector<std::uint32_t> Connections::unanswered(std::uint64_t client) const {
   const BiasedLock::Guard lock(*connection->lock);
   if (!connection->isOpenFor(route)) return ids;
   for (const auto& place : connection->unanswered) {
-    if (const auto id = place.load(std::memory_order_relaxed); id != 0) ids.push_back(id);
+    const auto id = detail::firstOf(place.load(std::memory_order_relaxed));
+    if (id != 0) ids.push_back(id);
   }
   return ids;
 }

@@ -129,7 +129,7 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   if (!connection.isOpenFor(route)) return ReplyResult::clientGone;
   auto& link = connection.channel->link();
   if (link.header().serverWindow != serverWindow_) return ReplyResult::clientGone;
-  const bool first = connection.isUnanswered(route.requestId);
+  const bool first = connection.isUnanswered(route);
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
   envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};

@@ -26,9 +26,8 @@ Message RelayServer::receive(MessageRun& run, std::uint64_t& client, std::size_t
   return core_->receiveOrTakeRun(run, client, most);
 }
 void RelayServer::refuse(std::uint64_t client, const MessageRun& run) noexcept {
-  const auto route = core_->connections().routeTo(client, 0);
-  if (route.link == 0) return;
-  core_->replies().refuse(Connection::of(route), route.flags, run, 0);
+  for (std::size_t index = 0; index < run.size(); ++index)
+    core_->replies().refuseAbandoned(core_->connections().routeTo(client, run[index].requestId()));
 }
 std::size_t RelayServer::replyTo(std::uint64_t client, const MessageRun& run,
                                  bool isFirst) noexcept {

@@ -95,7 +95,7 @@ RepliedMany ReplySender::sendRun(const Message& request, const Bodies& bodies) n
       bodies.fillSlots() && bodies.size <= connection->channel->link().maxMessageBytes();
   // The first reply, which ends the request, and bodies of other lengths go as messages. They are
   // copies: a body in a chunk would be sent in place, and the chunk belongs to the caller.
-  while (sent.count < count && (!fillSlots || connection->isUnanswered(route.requestId))) {
+  while (sent.count < count && (!fillSlots || connection->isUnanswered(route))) {
     auto message = Message::copyInline(bodies.type, bodies.from(sent.count).first(1).all);
     message.setRoute({route.link, route.requestId, route.flags, nullptr});
     message.setClientType(request.getClientType());
@@ -209,7 +209,7 @@ void ReplySender::refuse(Connection& connection, std::uint32_t generation, const
   const auto givenNs = message.getTimeStampNs();
   const auto timeNs = stamps_ && givenNs == 0 ? Clock::wallNs() : givenNs;
   const auto requestId = message.route().requestId;
-  const bool isFirst = connection.isUnanswered(requestId);
+  const bool isFirst = connection.isUnanswered(message.route());
   const auto envelope = [&]() __attribute__((always_inline)) {
     return Envelope{
         .type = static_cast<std::uint16_t>(message.getType()),
@@ -249,9 +249,9 @@ void ReplySender::refuseAbandoned(const Route& route) noexcept {
   auto* const connection = Connection::tryOf(route);
   if (connection == nullptr) return;
   const BiasedLock::Guard lock(*connection->lock);
-  if (!connection->isOpenFor(route) || !connection->isUnanswered(route.requestId)) return;
+  if (!connection->isOpenFor(route) || !connection->isUnanswered(route)) return;
   Message message = RequestFateMessage({.fate = Fate::refused, .requestId = route.requestId});
-  message.setRoute(connection->routeOf(route.requestId, nullptr));
+  message.setRoute({route.link, route.requestId, route.flags, nullptr});
   if (sendOneLocked(*connection, message) == ReplyResult::sent) counts_.refused();
 }
 

@@ -15,6 +15,10 @@ constexpr int kLastLooks = 32;  // calls of runOnce() for a request whose time h
 // This memory has few chunks: see ServerOptions::queueSize.
 constexpr int kMostBorrowed = 32;
 
+bool endsRequest(const Message& message) noexcept {
+  return (message.route().flags & kEndsRequest) != 0;
+}
+
 }  // namespace
 
 Requester::Requester(const Backplane& backplane, const std::string& server, std::int32_t location,
@@ -29,10 +33,10 @@ Requester::~Requester() = default;
 void Requester::close() {
   const std::lock_guard lock(mutex_);
   isClosed_ = true;
-  for (const auto& [id, exchange] : exchanges_) {
-    exchange->isDisconnected = true;
-    if (!exchange->hasEnded()) exchange->fate = Fate::cancelled;
-  }
+  exchanges_.forEach([](Exchange& exchange) {
+    exchange.isDisconnected = true;
+    if (!exchange.hasEnded()) exchange.fate = Fate::cancelled;
+  });
   exchanges_.clear();
   changed_.notify_all();
   dispatcher_.interrupt();
@@ -45,8 +49,9 @@ void Requester::take(Message&& message) {
   if (isClosed_) return;  // the exchanges may not exist any more
   if (const auto* connect = message.tryAs<Connect>()) {
     takeConnect(*connect);
-  } else if (const auto at = exchanges_.find(message.route().requestId); at != exchanges_.end()) {
-    takeAnswer(*at->second, std::move(message));
+  } else if (auto* const exchange =
+                 exchanges_.tryFind(message.route().requestId, endsRequest(message))) {
+    takeAnswer(*exchange, std::move(message));
   }
   changed_.notify_all();
 }
@@ -54,11 +59,9 @@ void Requester::take(Message&& message) {
 void Requester::takeAnswer(Exchange& exchange, Message&& message) {
   exchange.missed += message.getMissed();
   if (const auto* fate = message.tryAs<RequestFate>()) {
-    if (!exchange.hasEnded()) exchange.fate = fate->fate;
-  } else if ((message.route().flags & kEndsRequest) != 0) {
-    if (!exchange.hasEnded()) {
-      keepReply(exchange, std::move(message));
-    }
+    exchange.fate = fate->fate;
+  } else if (endsRequest(message)) {
+    keepReply(exchange, std::move(message));
   } else if (exchange.limit > 0) {
     if (exchange.further.size() == exchange.limit) {
       exchange.further.pop_front();
@@ -91,8 +94,9 @@ void Requester::freeReply(Exchange& exchange) noexcept {
 void Requester::takeConnect(const Connect& connect) {
   if (connect.status == ConnectStatus::connectNo) {
     // Those that have not ended are sent again to the next server.
-    for (const auto& [id, exchange] : exchanges_)
-      exchange->isDisconnected = exchange->isDisconnected || exchange->hasEnded();
+    exchanges_.forEach([](Exchange& exchange) {
+      exchange.isDisconnected = exchange.isDisconnected || exchange.hasEnded();
+    });
   }
   if (keepsEvents_) events_.push_back(0);
 }
@@ -218,7 +222,7 @@ SendResult Requester::send(Message&& message, Exchange& exchange, Deadline takeB
   // The lock is held until the request is in the table: its reply may arrive at once.
   const std::lock_guard lock(mutex_);
   const auto result = client_.send(std::move(message), takeBefore, &exchange.id, retry);
-  if (result == SendResult::sent) exchanges_.insert_or_assign(exchange.id, &exchange);
+  if (result == SendResult::sent) exchanges_.add(exchange);
   return result;
 }
 
@@ -229,7 +233,7 @@ SentMany Requester::sendMany(std::span<Message> messages, std::span<Exchange* co
   const auto sent = client_.sendMany(messages, takeBefore, ids);
   for (std::size_t i = 0; i < sent.count; ++i) {
     exchanges[i]->id = ids[i];
-    exchanges_.insert_or_assign(ids[i], exchanges[i]);
+    exchanges_.add(*exchanges[i]);
   }
   return sent;
 }
@@ -253,7 +257,7 @@ void Requester::cancel(Exchange& exchange) { client_.cancel(exchange.id); }
 
 void Requester::forget(Exchange& exchange) {
   const std::lock_guard lock(mutex_);
-  exchanges_.erase(exchange.id);
+  exchanges_.remove(exchange);
   freeReply(exchange);
   exchange.isDisconnected = true;
   if (exchange.hasEnded()) return;

@@ -12,35 +12,18 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include <mpf/message_client.h>
 
+#include "python/extension/exchanges.h"
+
 namespace mpf::python {
-
-// A request and what came back. Requester guards it.
-struct Exchange {
-  std::uint32_t id = 0;  // 0: not sent, or sent again under another number
-  Message reply;
-  bool hasReply = false;  // also after `reply` was moved out
-  bool isBorrowed = false;  // the body of `reply` is in the memory of the connection
-  std::optional<Fate> fate;
-  // Further replies wait here, at most `limit`; then the oldest is dropped and counted in `missed`.
-  std::deque<Message> further;
-  std::size_t limit = 0;
-  std::uint64_t missed = 0;
-  bool isDisconnected = false;  // no more further replies: the connection has ended
-
-  [[nodiscard]] bool hasEnded() const noexcept { return fate || hasReply; }
-};
 
 class Requester {
  public:
@@ -114,7 +97,7 @@ class Requester {
   std::condition_variable changed_;  // an exchange has changed, or no thread runs the dispatcher
   bool isRunning_ = false;  // a thread runs the dispatcher
   int turns_ = 0;  // threads with a Turn, which run it before those that wait
-  std::unordered_map<std::uint32_t, Exchange*> exchanges_;
+  Exchanges exchanges_;
   int borrowed_ = 0;  // replies in exchanges whose memory is that of the connection
   std::vector<std::uint32_t> events_;
   bool keepsEvents_ = false;

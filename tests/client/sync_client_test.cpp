@@ -6,6 +6,7 @@
 #include <atomic>
 #include <gtest/gtest.h>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <mpf/message_server.h>
@@ -48,6 +49,20 @@ TEST(SyncClientTest, ReturnsMessagesThatHaveArrivedWithoutWaiting) {
 
   EXPECT_TRUE(subscription.client.receive(0s));
   EXPECT_FALSE(subscription.client.receive(0s));
+}
+
+// A subscription whose client has used all ids since.
+TEST(SyncClientTest, AFurtherReplyWithTheIdOfARequestIsNoAnswer) {
+  Subscription subscription;
+  auto further = subscription.server.allocReplyMessage<Int32>(subscription.held);
+  auto route = further.route();
+  ++route.requestId;  // that of the next request
+  further.setRoute(route);
+  ASSERT_EQ(subscription.server.reply(std::move(further)), ReplyResult::sent);
+
+  EXPECT_EQ(subscription.client.call(Int32Message(), 0s).fate(), Fate::expired);
+
+  EXPECT_TRUE(subscription.client.receive(0s));
 }
 
 // The dispatcher looks at deadlines only after some messages of a busy link.

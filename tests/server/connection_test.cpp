@@ -50,7 +50,7 @@ TEST(ConnectionTest, ClientsOfOneIndexHaveDifferentNumbers) {
   const auto connection = Connection::take();
   const auto former = connection->client();
 
-  ++connection->generation;
+  ++connection->clientGeneration;
 
   EXPECT_NE(connection->client(), former);
   EXPECT_NE(former, 0u);
@@ -58,10 +58,10 @@ TEST(ConnectionTest, ClientsOfOneIndexHaveDifferentNumbers) {
 
 TEST(ConnectionTest, FindsAnUnansweredRequestByItsFullId) {
   const auto connection = Connection::take();
-  connection->unanswered = std::vector<std::atomic<std::uint32_t>>(8);
+  connection->unanswered = std::vector<std::atomic<std::uint64_t>>(8);
   connection->unansweredMask = 7;
 
-  connection->placeOf(9).store(9, std::memory_order_relaxed);
+  ASSERT_TRUE(connection->tryNoteRequest(9));
 
   EXPECT_TRUE(connection->isUnanswered(9));
   EXPECT_FALSE(connection->isUnanswered(1)) << "has the same place";

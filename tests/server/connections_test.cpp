@@ -122,6 +122,35 @@ TEST_F(ConnectionsTest, ExceptionsOfTheCallbackAreThrownLaterInTheirOrder) {
   EXPECT_FALSE(connections_.hasThrown());
 }
 
+TEST_F(ConnectionsTest, ARequestIsNotThatOfTheSameIdAfterTheClientHasUsedAllIds) {
+  auto& connection = accept(createLink());
+  const auto client = connection.client();
+  const auto answered = noteRequest(connection, 5);
+  connection.noteFirstReply(5, counts_);
+  const auto waiting = noteRequest(connection, 0xFFFFFFFF);
+
+  const auto present = noteRequest(connection, 5);
+
+  EXPECT_TRUE(connection.isUnanswered(present));
+  EXPECT_TRUE(connection.isUnanswered(waiting));
+  EXPECT_FALSE(connection.isUnanswered(answered)) << "has the id of another request";
+  EXPECT_TRUE(Connections::isConnected(answered));
+  EXPECT_EQ(Connections::clientOf(present), client);
+  EXPECT_TRUE(connection.isUnanswered(connections_.routeTo(client, 5)));
+  EXPECT_TRUE(connection.isUnanswered(connections_.routeTo(client, 0xFFFFFFFF)));
+  EXPECT_EQ(connections_.routeTo(client, 6).flags, present.flags);
+}
+
+TEST_F(ConnectionsTest, IdsInAnotherOrderAreNoNewCount) {
+  auto& connection = accept(createLink());
+  const auto first = noteRequest(connection, 0x80000001);
+  connection.noteFirstReply(first.requestId, counts_);
+
+  for (const auto id : {2u, 1u, 0x80000000u, 0x7FFFFFFFu}) noteRequest(connection, id);
+
+  EXPECT_EQ(connection.routeOf(1, nullptr).flags, first.flags);
+}
+
 TEST_F(ConnectionsTest, AnExceptionOfTheCallbackEndsTheNextWait) {
   auto& connection = accept(createLink());
   connections_.onClient([](std::uint64_t, bool) { throw std::runtime_error("off"); });

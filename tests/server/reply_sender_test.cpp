@@ -51,6 +51,26 @@ TEST_F(ReplySenderTest, TheFirstReplyEndsTheRequest) {
   EXPECT_EQ(valueOf(control().sent), 2u);
 }
 
+// A subscription is kept, and its client has used all ids since.
+TEST_F(ReplySenderTest, AFurtherReplyDoesNotEndAnotherRequestWithTheSameId) {
+  const auto subscription = noteRequest(connection_, 3);
+  auto first = replyTo(subscription);
+  ASSERT_EQ(replies_.send(first), ReplyResult::sent);
+  ASSERT_EQ(take(link_).flags, layout::kSlotFirstReply);
+  noteRequest(connection_, 0xFFFFFFFF);
+  const auto request = noteRequest(connection_, 3);
+
+  auto further = replyTo(subscription);
+  EXPECT_EQ(replies_.send(further), ReplyResult::sent);
+  EXPECT_EQ(take(link_).flags, 0u);
+  replies_.refuseAbandoned(subscription);
+  EXPECT_FALSE(link_.incoming().hasMessage());
+
+  auto reply = replyTo(request);
+  EXPECT_EQ(replies_.send(reply), ReplyResult::sent);
+  EXPECT_EQ(take(link_).flags, layout::kSlotFirstReply);
+}
+
 TEST_F(ReplySenderTest, CountsItsRepliesWhateverTheClientWrites) {
   auto reply = replyTo(noteRequest(connection_, 3));
   link_.control().serverSent.store(1000, std::memory_order_relaxed);

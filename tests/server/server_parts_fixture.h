@@ -32,7 +32,7 @@ class ServerPartsTest : public ShmTest {
   }
   // The route of a request that the server has taken from this connection.
   static Route noteRequest(Connection& connection, std::uint32_t requestId) {
-    connection.placeOf(requestId).store(requestId, std::memory_order_relaxed);
+    EXPECT_TRUE(connection.tryNoteRequest(requestId));
     return connection.routeOf(requestId, nullptr);
   }
   // The next message that the client receives; an empty envelope if no message waits.
