@@ -59,7 +59,6 @@ class PrologixLink {
     std::string commands;  // whole lines
     Deadline deadline;
     std::chrono::milliseconds silence{0};  // the ++read_tmo_ms in `commands`, if there is one
-    // NOLINTNEXTLINE(readability-redundant-member-init): g++ needs it
     std::optional<std::uint8_t> otherMarkThan{};
   };
 

@@ -31,7 +31,6 @@ class PrologixModel {
     bool hasRemoteEnable = false;  // ++ren
     std::chrono::milliseconds delay{0};  // before it executes a line
     // Sent before each line is executed.
-    // NOLINTNEXTLINE(readability-redundant-member-init): g++ wants it
     std::string garbage{};
     bool isSilent = false;  // receives, and executes nothing
     bool cutsConnection = false;  // instead of executing a line

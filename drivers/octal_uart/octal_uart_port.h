@@ -23,7 +23,7 @@ namespace mpf {
 struct OctalUartPortOptions {
   // A field that is 0 means the usual value: 9600 baud, 8 bits, no parity, 1 stop bit, no flow
   // control.
-  SerialSettings settings = {};  // NOLINT(readability-redundant-member-init): g++ wants it
+  SerialSettings settings = {};
   // What to do when the module does not answer. true: openOctalUartPort() returns at once, and the
   // port is unplugged until an attempt succeeds. false: openOctalUartPort() throws.
   bool waitForModule = false;

@@ -35,8 +35,7 @@ struct Behaviour {
   std::chrono::milliseconds delay{0};  // before the answer
   // If set, the answer is sent byte by byte, with this pause between bytes.
   std::optional<std::chrono::milliseconds> gap = std::nullopt;
-  std::string noise =
-      {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
+  std::string noise = {};  // bytes before the answer
   bool isSilent = false;  // no answer at all
   std::string answerEnd = "\r\n";
 };

@@ -60,7 +60,6 @@ class TopView {
     Page page = Page::servers;
     std::uint64_t of = 0;  // id of the row that was opened
     // Title of that row when it was last seen.
-    // NOLINTNEXTLINE(readability-redundant-member-init): g++ warns without an initializer
     std::string title = {};
     std::size_t sortColumn = 0;
     bool isReversed = false;

@@ -20,7 +20,7 @@ struct SerialServerStart {
   std::string server;
   std::string port;  // name of an --octal-port, terminal device, or tcp:HOST:PORT
   int queueSize = 20;
-  SerialServerOptions serial = {};  // NOLINT(readability-redundant-member-init): g++ wants it
+  SerialServerOptions serial = {};
 };
 
 struct SerialStartOptions {

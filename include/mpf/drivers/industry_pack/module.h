@@ -36,7 +36,7 @@ struct ModuleKind {
   };
   // Other manufacturers of modules for the same driver. Without {}, g++ requires this member in
   // each initializer.
-  std::vector<Maker> others{};  // NOLINT(readability-redundant-member-init)
+  std::vector<Maker> others{};
 };
 
 // Manufacturers in the ID PROM.

@@ -29,7 +29,7 @@ struct PosixTerminalOptions {
   // in at another place.
   std::string device;
   // A field that is 0 keeps the setting that the device has.
-  SerialSettings settings = {};  // NOLINT(readability-redundant-member-init): g++ needs it
+  SerialSettings settings = {};
   // What to do when the device cannot be opened. true: openPosixTerminal() returns at once, and the
   // port is unplugged until an attempt succeeds. false: openPosixTerminal() throws.
   bool waitForDevice = false;
