@@ -29,7 +29,7 @@ mode_t parseMode(const std::string& text) {
       fmt::format("{}: use an octal number between 0600 and 0666, such as 0660", text));
 }
 
-const Rights& checkServerRights(const Rights& rights) {
+Rights checkServerRights(const Rights& rights) {
   if (!isValid(rights.mode))
     throw std::invalid_argument(fmt::format(
         "mode {:#o} of the rights: use read and write bits of user, group and others (0666), with "

@@ -18,7 +18,7 @@ namespace mpf {
 
 // Returns the rights of a server if they are valid.
 //   throws  std::invalid_argument that names the invalid value and the valid ones
-const Rights& checkServerRights(const Rights& rights);
+Rights checkServerRights(const Rights& rights);
 
 // Returns the number of the group `name`.
 //   throws  std::invalid_argument that names the group if it does not exist
