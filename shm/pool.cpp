@@ -34,7 +34,7 @@ std::uint32_t chunkCountFor(std::size_t chunkBytes) {
 
 PoolOwner::PoolOwner(PoolPlace place, Rights rights, std::uint64_t maxBytes,
                      layout::ReturnRing& returns)
-    : place_(std::move(place)), rights_(rights), maxBytes_(maxBytes), returns_(&returns) {}
+    : place_(place), rights_(rights), maxBytes_(maxBytes), returns_(&returns) {}
 
 PoolOwner::~PoolOwner() {
   if (forkGuard_.isInherited() || leavesNames_) return;
@@ -46,8 +46,7 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
   if (!canLend() || bytes > kMaxChunkBytes) return std::nullopt;
   const auto chunkBytes = chunkBytesFor(bytes);
   for (int attempt = 0; attempt < 2; ++attempt) {
-    for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
-      auto& bulk = bulks_[segment];
+    for (auto& bulk : bulks_) {
       if (bulk.chunkSize.bytes() != chunkBytes || bulk.free.empty()) continue;
       const auto index = bulk.free.back();
       bulk.free.pop_back();

@@ -164,7 +164,7 @@ class PoolOwner {
 class PoolBorrower {
  public:
   PoolBorrower(PoolPlace place, std::uint64_t maxBytes, layout::ReturnRing& returns)
-      : place_(std::move(place)), maxBytes_(maxBytes), returns_(&returns) {}
+      : place_(place), maxBytes_(maxBytes), returns_(&returns) {}
 
   // Maps a chunk that the peer sent; nullopt if there is no such chunk.
   //   throws  std::system_error, std::bad_alloc: no free descriptor or no memory to map it

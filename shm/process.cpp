@@ -80,8 +80,8 @@ bool isGone(const layout::SegmentHeader& header) noexcept {
 
 const Process& Process::self() noexcept {
   // Not under a lock: another thread may hold it during a fork, and the child would wait for it.
-  thread_local ForkGuard fork;
-  thread_local Process self;
+  static thread_local ForkGuard fork;
+  static thread_local Process self;
   const bool isKnown = self.pid == ::getpid() && !fork.isInherited() && self.startTicks != 0 &&
                        self.pidNamespace != 0;  // 0: /proc could not be read
   if (isKnown) return self;
