@@ -39,7 +39,7 @@ template <class T>
 void claim(T& field) noexcept {
   if (requestsReadLines()) return request(&field);
   volatile T& same = field;
-  same = same;
+  same = same;  // NOLINT(misc-redundant-expression): reads and writes
 }
 
 // Moves the line at `address` from this processor to the cache that all processors share, from

@@ -291,6 +291,7 @@ inline constexpr std::uint32_t kReturnsFanOut = 1u << 31;
 
 enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused = 3 };
 
+// NOLINTNEXTLINE(clang-analyzer-optin.performance.Padding): grouped by cache lines
 struct LinkControl {
   // Both sides read these words for each message, so nothing here changes with each message.
   alignas(kPairBytes) std::atomic<LinkState> clientState;  // client

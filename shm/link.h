@@ -161,6 +161,7 @@ class Link {
   // The envelope stays where it is: a copy would wait for the stores to it.
   LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
                    Limits limits) noexcept {
+    // NOLINTNEXTLINE(bugprone-return-const-ref-from-parameter): used only during the call
     return trySend([&]() -> const Envelope& { return envelope; }, body, limits);
   }
   // Sends messages whose bodies fill a slot each and lie one after the other. For each, calls

@@ -54,6 +54,7 @@ class NoticeBatch {
     if (delayed_ >= most) give();
   }
 
+  // NOLINTNEXTLINE(readability-identifier-naming): a private member, static or not, ends in `_`
   static inline constinit thread_local NoticeBatch* current_ = nullptr;
   std::shared_ptr<PeerWindow> peer_;  // nullptr: no notice is delayed
   std::uint32_t link_ = 0;

@@ -25,7 +25,7 @@ class ProcessCondition {
 
  private:
   union {
-    std::condition_variable condition_;
+    std::condition_variable condition_;  // NOLINT(readability-identifier-naming): private
   };
   ForkGuard forkGuard_;
 };
