@@ -72,7 +72,7 @@ void Connector::setReason(std::string_view reason) noexcept {
 
 void Connector::notifyConnected() {
   const std::lock_guard lock(mutex_);
-  const auto former = std::exchange(reason_, {});  // frees its memory
+  std::string().swap(reason_);  // frees its memory
   connected_.get().notify_all();
 }
 
