@@ -36,20 +36,20 @@ void CallbackErrors::report() noexcept try {
       "in the callback.",
       client, textOfException());
   if (limiter_.admit({}, 0, text, Clock::nowNs())) write({{0, text}});
+  // NOLINTNEXTLINE(bugprone-empty-catch): no memory: the alarm of the dispatcher counts it
 } catch (const std::exception&) {
-  // No memory for the text: the alarm of the dispatcher counts the exception.
 }
 
 void CallbackErrors::writeDue() noexcept try {
   if (dueNs() != INT64_MAX) write(limiter_.takeDue(Clock::nowNs()));
+  // NOLINTNEXTLINE(bugprone-empty-catch): as above
 } catch (const std::exception&) {
-  // as above
 }
 
 void CallbackErrors::writeHeld() noexcept try {
   write(limiter_.takeAll(Clock::nowNs()));
+  // NOLINTNEXTLINE(bugprone-empty-catch): as above
 } catch (const std::exception&) {
-  // as above
 }
 
 void CallbackErrors::write(const std::vector<LogLimiter::Line>& lines) {

@@ -78,7 +78,8 @@ class RunnerLock {
     noteRunner();
   }
 
-  struct WaitingRunner {
+  class WaitingRunner {
+   public:
     explicit WaitingRunner(std::atomic<int>& number) noexcept : number_(number) {
       // PAIR(runner-waiting): before wakeOwner().
       number_.fetch_add(1, std::memory_order_seq_cst);
@@ -86,6 +87,8 @@ class RunnerLock {
     ~WaitingRunner() { number_.fetch_sub(1, std::memory_order_relaxed); }
     WaitingRunner(const WaitingRunner&) = delete;
     WaitingRunner& operator=(const WaitingRunner&) = delete;
+
+   private:
     std::atomic<int>& number_;
   };
 

@@ -60,6 +60,7 @@ SendResult SyncClient::send(Message&& message, Deadline deadline, Retry retry) {
   for (;;) {
     if (!client_.isConnected() && !connectWait(deadline.left())) return SendResult::notConnected;
     // send() may write awaited_ before the reply is handled: only this thread delivers replies.
+    // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
     const auto result = client_.send(std::move(message), deadline, &awaited_, retry);
     // The server may stop between the connection and the sending.
     if (result != SendResult::notConnected || retry == Retry::never || deadline.hasPassed())
