@@ -17,6 +17,19 @@ namespace {
 
 constexpr const char* kServerForm = "SERVER,PORT[,BUFSIZE[,QUEUESIZE[,EOMSTR[,CIRCULAR]]]]";
 
+constexpr const char* kFooter =
+    "Startup commands of the original MPF:\n"
+    "  initSerialServer(\"server\", \"port\", bufsize, queuesize, \"eomstr\", circular)\n"
+    "  initOctalUART(\"module\", \"carrier\", \"site\", nports, intVec)\n"
+    "  initOctalUARTPort(\"port\", \"module\", n, baud, \"parity\", stopbits, bits, \"flow\")\n"
+    "Examples:\n"
+    "  mpf-serial-server dmm /dev/ttyS0 1000 20 '\\r\\n' 1 --baud 19200\n"
+    "  mpf-serial-server --carrier ipac=model --octal-uart UART0,ipac,IP_a,8,100\n"
+    "    --octal-port 'UART0[0],UART0,0,9600,N,1,8,N' --server "
+    "'a-Serial[0],UART0[0],1000,20,\\r,1'\n"
+    "    --octal-port 'UART0[1],UART0,1,38400,E,1,7,N' --server "
+    "'a-Serial[1],UART0[1],1000,20,\\r\\n,1'";
+
 constexpr int kLongestAnswer = 1 << 20;
 constexpr int kLongestQueue = LinkGeometry::kMaxQueueSize;
 
@@ -138,18 +151,7 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
   app.get_option("--wait")->description(
       "Start even if the line or its board is missing, and wait for it");
   arguments.addTo(app);
-  app.footer(
-      "Startup commands of the original MPF:\n"
-      "  initSerialServer(\"server\", \"port\", bufsize, queuesize, \"eomstr\", circular)\n"
-      "  initOctalUART(\"module\", \"carrier\", \"site\", nports, intVec)\n"
-      "  initOctalUARTPort(\"port\", \"module\", n, baud, \"parity\", stopbits, bits, \"flow\")\n"
-      "Examples:\n"
-      "  mpf-serial-server dmm /dev/ttyS0 1000 20 '\\r\\n' 1 --baud 19200\n"
-      "  mpf-serial-server --carrier ipac=model --octal-uart UART0,ipac,IP_a,8,100\n"
-      "    --octal-port 'UART0[0],UART0,0,9600,N,1,8,N' --server "
-      "'a-Serial[0],UART0[0],1000,20,\\r,1'\n"
-      "    --octal-port 'UART0[1],UART0,1,38400,E,1,7,N' --server "
-      "'a-Serial[1],UART0[1],1000,20,\\r\\n,1'");
+  app.footer(kFooter);
   if (const auto status = parseCommandLine(app, argc, argv)) return status;
   const auto bytes = tryReadEom(eom);
   if (!bytes)
