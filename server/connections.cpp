@@ -43,7 +43,8 @@ void Connections::reportClient(std::uint64_t client, bool isConnected) noexcept 
   try {
     thrown_.push_back(std::current_exception());
     endpoint_.interrupt();  // the next wait() returns at once
-  } catch (const std::bad_alloc&) {  // the exception is lost
+    // NOLINTNEXTLINE(bugprone-empty-catch): the exception is lost
+  } catch (const std::bad_alloc&) {
   }
 }
 

@@ -54,7 +54,8 @@ class ServerLog::Writer {
       queue_.push_back({spdlog::log_clock::now(), level, std::move(text)});
     }
     changed_.notify_one();
-  } catch (...) {  // no memory for a line: the line is lost and the program continues
+    // NOLINTNEXTLINE(bugprone-empty-catch): no memory: the line is lost, the program continues
+  } catch (...) {
   }
 
   void wakeAt(std::int64_t dueNs) noexcept {
