@@ -66,7 +66,7 @@ void askBare(const RunContext& context, const EpicsBench& bench) {
 // Processes a record without device support of MPF in a loop.
 void processSoft(const RunContext& context, const EpicsBench& bench) {
   auto& ioc = loadBenchIoc();
-  ioc.start(bench.backplane, "record(ai, \"soft\") { field(INP, \"1\") }");
+  ioc.start(bench.backplane, R"(record(ai, "soft") { field(INP, "1") })");
   constexpr int kAtOnce = 100;
   timeRate(context, kAtOnce, [&] { ioc.process("soft", kAtOnce); });
 }
