@@ -26,7 +26,7 @@ std::string shortened(std::string text) {
 std::string displayText(const std::string& text) { return shortened(printable(shortened(text))); }
 
 std::string reasonOf(const kj::Exception& error) {
-  const auto said = toStd(error.getDescription());
+  auto said = toStd(error.getDescription());
   if (said.starts_with("operation timed out")) return std::string(kTimeout);
   for (const std::string_view mark : {"gai_strerror(status) = ", "): "}) {
     const auto at = said.find(mark);

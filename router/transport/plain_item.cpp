@@ -187,7 +187,7 @@ PlainItems PlainFrame::readItems(std::uint32_t index, std::uint32_t end,
       items.isRequest = found.isRequest;
       items.isFirst = found.isFirst();
       items.client = client;
-      first = last = id;
+      first = id;
     } else if (found.type != run.type() || found.isRequest != items.isRequest ||
                found.isFirst() != items.isFirst || client != items.client ||
                (id - first <= last - first && (items.isRequest || items.isFirst))) {

@@ -40,7 +40,7 @@ kj::TlsContext contextOf(const TlsTexts& texts, Side side) {
 }
 
 constexpr const char* kNoTls =
-    "the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers";
+    R"(the peer does not use TLS: set the same security, "tls" or "plain", at both routers)";
 constexpr const char* kNotVersion13 =
     "the peer does not support TLS 1.3, the only version that routers use";
 constexpr const char* kClosed = "the peer closed the connection during the TLS handshake";
