@@ -88,7 +88,7 @@ void Polling::lookForAnswers() {
 }
 
 void Polling::pollWindows() {
-  // A window may be added or removed by the call.
+  // NOLINTNEXTLINE(modernize-loop-convert): the call may add or remove a window
   for (std::size_t at = 0; at < windows_.size(); ++at) windows_[at]->poll();
 }
 

@@ -19,7 +19,7 @@
 
 namespace mpf::router {
 
-class Proxy;
+class Proxy;  // NOLINT(cppcoreguidelines-virtual-class-destructor): it is final
 
 class RemoteConnection {
  public:

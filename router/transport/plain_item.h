@@ -50,6 +50,7 @@ struct PlainItem {
 
   // Whether `message` has a form that a plain item can have.
   [[nodiscard]] static bool canCarry(const Message& message) noexcept;
+  // NOLINTNEXTLINE(google-explicit-constructor): the same item; its message by reference
   operator PlainOutgoing() const noexcept {
     return {isRequest, isFirst, client, requestId, message};
   }
