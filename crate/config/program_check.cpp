@@ -71,7 +71,8 @@ std::vector<std::string> environmentOf(const ProcessPlan& plan) {
     const std::string text = *one;
     if (!plan.environment.contains(text.substr(0, text.find('=')))) variables.push_back(text);
   }
-  for (const auto& [name, value] : plan.environment) variables.push_back(name + "=" + value);
+  for (const auto& [name, value] : plan.environment)
+    variables.push_back(fmt::format("{}={}", name, value));
   return variables;
 }
 

@@ -15,6 +15,7 @@ std::vector<OptionKind> withHardware(std::vector<OptionKind> options) {
   return options;
 }
 
+// NOLINTNEXTLINE(readability-function-size): a table
 std::vector<ProgramKind> makeKinds() {
   std::vector<ProgramKind> kinds;
   kinds.push_back(

@@ -133,7 +133,7 @@ class CrateReader {
  private:
   // A text, an integer, a number or a flag, as it is written in a command line.
   static std::optional<std::string> textOf(const toml::node& node) {
-    if (const auto text = node.value_exact<std::string>()) return *text;
+    if (auto text = node.value_exact<std::string>()) return text;
     if (const auto integer = node.value_exact<std::int64_t>()) return fmt::to_string(*integer);
     if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
     if (const auto flag = node.value_exact<bool>()) return *flag ? "true" : "false";
