@@ -78,7 +78,8 @@ void Requester::keepReply(Exchange& exchange, Message&& reply) {
     try {
       reply = reply.duplicate();
       exchange.isBorrowed = false;
-    } catch (const std::bad_alloc&) {  // the reply stays where it is
+      // NOLINTNEXTLINE(bugprone-empty-catch): the reply stays where it is
+    } catch (const std::bad_alloc&) {
     }
   }
   if (exchange.isBorrowed) ++borrowed_;

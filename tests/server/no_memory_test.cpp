@@ -60,7 +60,7 @@ TEST_F(NoMemoryTest, TheConstructorThrows) {
     try {
       const LimitedMemory limited(allocations);
       server = std::make_unique<MessageServer>(backplane_, kName);
-    } catch (const std::bad_alloc&) {
+    } catch (const std::bad_alloc&) {  // NOLINT(bugprone-empty-catch): the loop repeats it
     }
   }
 
@@ -78,7 +78,7 @@ TEST_F(NoMemoryTest, TheDeathOfAClientEndsItsConnection) {
       try {
         const LimitedMemory limited(allocations);
         EXPECT_FALSE(server->receive());
-      } catch (const std::bad_alloc&) {
+      } catch (const std::bad_alloc&) {  // NOLINT(bugprone-empty-catch): the loop repeats it
       }
     }
 

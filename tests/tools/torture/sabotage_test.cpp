@@ -103,7 +103,7 @@ TEST(SabotageOfNames, AChildKeepsTheNameOfADeadServerUntilTheEnd) {
     try {
       const MessageServer successor(backplane, "mortal");
       isFree = true;
-    } catch (const std::exception&) {  // the child still exists
+    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): the child still exists
     }
   }
 }
