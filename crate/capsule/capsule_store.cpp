@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <fmt/format.h>
+#include <ranges>
 #include <string_view>
 
 #include <mpf/clock.h>
@@ -85,11 +86,11 @@ void CapsuleStore::prune(const std::string& newest) const {
   std::ranges::stable_partition(paths, [&](const auto& path) { return path != newest; });
   std::uint64_t bytes = 0;
   std::size_t kept = 0;
-  for (auto path = paths.rbegin(); path != paths.rend(); ++path) {
+  for (const auto& path : std::views::reverse(paths)) {
     std::error_code gone;
-    const auto size = std::filesystem::file_size(*path, gone);
+    const auto size = std::filesystem::file_size(path, gone);
     if (!gone) bytes += size;
-    if (kept != 0 && (kept >= maxFiles_ || bytes > maxBytes_)) std::filesystem::remove(*path, gone);
+    if (kept != 0 && (kept >= maxFiles_ || bytes > maxBytes_)) std::filesystem::remove(path, gone);
     else ++kept;
   }
 }

@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <fmt/format.h>
+#include <ranges>
 #include <set>
 
 #include "schema/json.h"
@@ -127,17 +128,16 @@ void addMessages(LinkRecord& record, const WitnessedLink& link, const Ring& requ
   auto shown = Tree::array();
   std::size_t taken = 0;
   std::uint64_t unanswered = 0;
-  const auto& all = requests.view.messages;
-  for (auto message = all.rbegin(); message != all.rend(); ++message) {
-    const auto isHere = isTaken(*message);
-    const auto id = message->first.front().requestId;
+  for (const auto& message : std::views::reverse(requests.view.messages)) {
+    const auto isHere = isTaken(message);
+    const auto id = message.first.front().requestId;
     const auto* const answered = isHere ? answers.of(id, taken) : "no";
-    if (answered == std::string_view("no") && message->state != MessageState::unpublished)
+    if (answered == std::string_view("no") && message.state != MessageState::unpublished)
       ++unanswered;
     const auto isLastTaken = isHere && taken == 0;
     if (isHere) ++taken;
     if (shown.size() >= last && !isLastTaken) continue;
-    auto tree = describe(link, *message);
+    auto tree = describe(link, message);
     tree["answered"] = answered;
     if (isLastTaken) record.lastTaken = tree;
     if (shown.size() < last) shown.insert(shown.begin(), std::move(tree));

@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kIocFile = "ioc.cmd";
 
-const std::string& checkedName(const std::string& name) {
+std::string checkedName(const std::string& name) {
   const auto problem = problemOfName(name);
   if (!problem.empty()) throw ConfigError("--" + problem);
   return name;

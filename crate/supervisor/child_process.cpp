@@ -66,7 +66,8 @@ struct Image {
           !plan.environment.contains(name))
         environment.push_back(text);
     }
-    for (const auto& [name, value] : plan.environment) environment.push_back(name + "=" + value);
+    for (const auto& [name, value] : plan.environment)
+      environment.push_back(fmt::format("{}={}", name, value));
     if (plan.notifies) environment.push_back("NOTIFY_SOCKET=" + notifySocket);
     for (auto& word : command) arguments.push_back(word.data());
     for (auto& one : environment) variables.push_back(one.data());
@@ -113,6 +114,7 @@ ChildProcess::ChildProcess(const ProcessPlan& plan, const std::string& log,
   const auto user = userOf(plan);
   const Image image(plan, notifySocket);
   const auto folder = plan.workingFolder.empty() ? std::string(".") : plan.workingFolder;
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): after what it needs
   pid_ = checkCall(::fork(), "fork");
   if (pid_ == 0) {
     gate.writing.reset();
@@ -145,6 +147,7 @@ std::uint64_t startTicksOf(pid_t pid) {
   if (stat) return stat->hasEnded() ? 0 : stat->number(ProcessStat::kStartTicks);
   const std::system_error error(errno, std::generic_category(),
                                 fmt::format("read /proc/{}/stat", pid));
+  // NOLINTNEXTLINE(misc-throw-by-value-catch-by-reference): examined before
   if (shortageOf(error) != layout::Shortage::none) throw error;
   return 0;  // a process that /proc hides belongs to another user, so it is not ours
 }

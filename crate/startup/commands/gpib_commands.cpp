@@ -41,7 +41,7 @@ Value initGpibServer(CommandCall& call, StartupSite& site) {
   if (call.isValid() && process == nullptr)
     call.refuse(1, fmt::format("the module \"{}\" does not exist at this line", module));
   else if (call.isValid() && process->find("bufsize") != nullptr)
-    call.refuse(1, fmt::format("the module \"{}\" has the server \"{}\" already", module,
+    call.refuse(1, fmt::format(R"(the module "{}" has the server "{}" already)", module,
                                process->valueOf("server")));
   const auto bufferSize = call.integer(2, "bufferSize", 0, kMaxGpibBuffer);
   const auto queueSize = call.queueSize(3);

@@ -89,7 +89,7 @@ Value initSerialServer(CommandCall& call, StartupSite& site) {
   server.source = call.source();
   if (const auto* const other = site.serialLines.serverOf(server.port))
     call.refuse(
-        1, fmt::format("the port \"{}\" has the server \"{}\" already", server.port, other->name));
+        1, fmt::format(R"(the port "{}" has the server "{}" already)", server.port, other->name));
   if (!server.port.empty() && site.serialLines.findPort(server.port) == nullptr) {
     const auto ports = site.serialLines.portNames();
     call.refuse(1, ports.empty()
@@ -157,8 +157,8 @@ void checkOctalBaud(CommandCall& call, std::size_t index, std::int64_t baud) {
 void checkPortIsFree(CommandCall& call, std::size_t index, const StartupSite& site,
                      const std::string& module, std::int64_t number) {
   if (const auto* const other = site.serialLines.portOf(module, number))
-    call.refuse(index, fmt::format("port {} of the module \"{}\" is the port \"{}\" already",
-                                   number, module, other->name));
+    call.refuse(index, fmt::format(R"(port {} of the module "{}" is the port "{}" already)", number,
+                                   module, other->name));
 }
 
 std::string readEndOfMessage(CommandCall& call, std::size_t index) {

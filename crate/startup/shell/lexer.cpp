@@ -144,6 +144,7 @@ void Lexer::readString() {
 void Lexer::readCharacter() {
   const auto begin = at_++;
   token_.kind = Token::Kind::integer;
+  // NOLINTNEXTLINE(bugprone-signed-char-misuse): the value of a char, as in C
   if (at_ < line_.size()) token_.integer = readEscape();
   if (peek() != '\'')
     throw LineError{begin + 1, "one character is expected between ' and ', such as 'N'"};
