@@ -49,7 +49,7 @@ bool isOutputLink(const dbCommon* record, const DBLINK* link) noexcept {
 
 // Why the server is not connected, in the 39 characters of AMSG: the link has the server's name.
 std::string whyDisconnected(const SharedClient& connection) {
-  const auto reason = connection.notConnectedBecause();
+  auto reason = connection.notConnectedBecause();
   const auto name = fmt::format("server \"{}\" ", connection.server());
   for (const auto& prefix : {fmt::format("{}at location {} ", name, connection.location()), name})
     if (reason.starts_with(prefix)) return "server " + reason.substr(prefix.size());
@@ -168,6 +168,7 @@ class DevMpf::Impl final : public SharedClient::Member,
     if (mask != 0) db_post_events(record_, valueOf(record_), mask | DBE_VALUE | DBE_LOG);
   }
 
+  // NOLINTBEGIN(readability-identifier-naming): DevMpf uses them as its own
   DevMpf& device_;
   dbCommon* const record_;
   const bool isOutput_;
@@ -176,6 +177,7 @@ class DevMpf::Impl final : public SharedClient::Member,
   long status_ = 0;
   IOSCANPVT scan_ = nullptr;
   Nanoseconds timeout_ = kDefaultTimeout;
+  // NOLINTEND(readability-identifier-naming)
 
  private:
   long start() {

@@ -55,6 +55,7 @@ ChildProgram::ChildProgram(const std::string& name, std::vector<std::string> arg
   for (auto& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
   const auto parent = ::getpid();
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): after what it needs
   pid_ = checkCall(::fork(), "start", name);
   if (pid_ == 0) run(parent, pointers.data(), output);
 }

@@ -128,6 +128,7 @@ void registerCommands() {
 }  // namespace
 
 extern "C" {
+// NOLINTNEXTLINE(misc-use-anonymous-namespace): its name is part of an exported name
 static void mpfRegistrar() { registerCommands(); }
 epicsExportRegistrar(mpfRegistrar);
 }

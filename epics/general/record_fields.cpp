@@ -81,7 +81,7 @@ double engineeringOfRaw(aoRecord& record, std::int32_t raw) {
   if (record.linr == menuConvertNO_CONVERSION) return number;
   if (record.linr == menuConvertLINEAR || record.linr == menuConvertSLOPE)
     return number * record.eslo + record.eoff;
-  cvtRawToEngBpt(&number, record.linr, record.init, &record.pbrk, &record.lbrk);
+  cvtRawToEngBpt(&number, static_cast<short>(record.linr), record.init, &record.pbrk, &record.lbrk);
   return number;
 }
 
@@ -93,7 +93,7 @@ double rawOf(const aoRecord& record) {
   } else if (record.linr != menuConvertNO_CONVERSION) {
     void* table = record.pbrk;
     short at = record.lbrk;
-    cvtEngToRawBpt(&number, record.linr, record.init, &table, &at);
+    cvtEngToRawBpt(&number, static_cast<short>(record.linr), record.init, &table, &at);
   }
   return (number - record.aoff) / (record.aslo == 0 ? 1 : record.aslo) - record.roff;
 }

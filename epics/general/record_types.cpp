@@ -23,11 +23,12 @@ template <class Record>
 MessageType typeOf(const dbCommon* common) {
   const auto& record = *reinterpret_cast<const Record*>(common);
   if constexpr (requires { record.bptr; }) return messageTypeOf(record.ftvl);
-  else if constexpr (std::is_same_v<Record, eventRecord>) return MessageType::int32;
-  else if constexpr (!std::is_arithmetic_v<decltype(record.val)>) return MessageType::char8Array;
   else if constexpr (std::is_same_v<decltype(record.val), epicsFloat64>)
     return MessageType::float64;
-  else return MessageType::int32;
+  else if constexpr (std::is_arithmetic_v<decltype(record.val)> ||
+                     std::is_same_v<Record, eventRecord>)
+    return MessageType::int32;
+  else return MessageType::char8Array;
 }
 
 template <class Record>
@@ -66,15 +67,15 @@ constexpr RecordAccess accessOf() {
 
 template <class Record>
 long init(dbCommon* common) {
-  static constexpr auto access = accessOf<Record>();
+  static constexpr auto kAccess = accessOf<Record>();
   auto& record = *reinterpret_cast<Record*>(common);
   // Base calls the support of aai in the first pass already, in which links are not parsed yet.
   if constexpr (std::is_same_v<Record, aaiRecord>)
     if (record.bptr == nullptr) return AAI_DEVINIT_PASS1;
-  const auto status = GeneralDevice::init(common, linkOf(record), access);
+  const auto status = GeneralDevice::init(common, linkOf(record), kAccess);
   // MPF_NoConvert: RVAL of an output is not known, and VAL of the database is kept.
-  constexpr bool isRawOutput = kIsOutput<Record> && requires { record.rval; };
-  return status == 0 && isRawOutput ? MPF_NoConvert : status;
+  constexpr bool kIsRawOutput = kIsOutput<Record> && requires { record.rval; };
+  return status == 0 && kIsRawOutput ? MPF_NoConvert : status;
 }
 
 // Base calls the support of aao in the first pass only: the records are kept until all records are

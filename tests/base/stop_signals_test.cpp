@@ -28,8 +28,8 @@ class StopSignalsTest : public testing::Test {
   // Returns when the other thread executes `callback`.
   void interruptOther(StopSignals::Callback callback) {
     signals.emplace(callback, this);
-    ::pthread_kill(other.native_handle(),
-                   SIGTERM);  // NOLINT(bugprone-bad-signal-to-kill-thread): it is handled
+    // NOLINTNEXTLINE(bugprone-bad-signal-to-kill-thread): it is handled
+    ::pthread_kill(other.native_handle(), SIGTERM);
     while (!entered) std::this_thread::yield();
   }
 

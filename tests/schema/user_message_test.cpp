@@ -38,7 +38,8 @@ TEST(User, RefusesAStructThatDoesNotFit) {
 
   EXPECT_THROW(fields.initValue(1000), kj::Exception);
   EXPECT_THROW(UserBuilder(UserMessage::allocValue(8)), kj::Exception);
-  EXPECT_THROW(std::move(UserBuilder(UserMessage::allocValue(64))).finish(), kj::Exception);
+  EXPECT_THROW(static_cast<void>(std::move(UserBuilder(UserMessage::allocValue(64))).finish()),
+               kj::Exception);
 }
 
 TEST(User, IsCopiedFromAnyBuilder) {

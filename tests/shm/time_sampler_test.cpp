@@ -65,7 +65,7 @@ TEST(TimeSampler, TimesThePartsOfABurstEvenly) {
     traffic.pass(5007);
   }
 
-  EXPECT_NEAR(first, all / 8, all / 50);
+  EXPECT_NEAR(first, all / 8.0, all / 50.0);
 }
 
 TEST(TimeSampler, TimesAllMessagesAgainSoonAfterFastTraffic) {

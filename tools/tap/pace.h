@@ -11,7 +11,7 @@ namespace mpf::tools {
 // the time now can be added.
 //   speed   above 0
 [[nodiscard]] inline std::int64_t replayedNs(std::int64_t ns, double speed) noexcept {
-  constexpr double kMost = 1LL << 62;
+  constexpr auto kMost = static_cast<double>(std::int64_t{1} << 62);
   return static_cast<std::int64_t>(std::min(static_cast<double>(ns) / speed, kMost));
 }
 

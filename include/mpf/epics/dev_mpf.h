@@ -60,8 +60,10 @@
 #include <mpf/message_of.h>
 
 // Results of startIO() and completeIO(), for record support.
+// NOLINTBEGIN(readability-identifier-naming): the names of the original MPF
 inline constexpr long MPF_OK = 0;
 inline constexpr long MPF_NoConvert = 2;  // success; an ai record does not convert RVAL to VAL
+// NOLINTEND(readability-identifier-naming)
 
 namespace mpf {
 
@@ -143,7 +145,7 @@ class DevMpf {
 
  private:
   friend class RecordQueue;
-  class Impl;
+  class Impl;  // NOLINT(cppcoreguidelines-virtual-class-destructor): deleted as Impl only
   std::unique_ptr<Impl> impl_;
 };
 
@@ -176,5 +178,7 @@ struct MpfDset {
   extern "C" {                                                                   \
   epicsExportAddress(dset, name);                                                \
   }
+// NOLINTBEGIN(cppcoreguidelines-macro-usage,readability-identifier-naming): of the original MPF
 #define MAKE_LINCONV_DSET(name, init) MPF_DSET_(name, init, 6, mpf::DevMpf::linearConvert)
 #define MAKE_DSET(name, init) MPF_DSET_(name, init, 5, nullptr)
+// NOLINTEND(cppcoreguidelines-macro-usage,readability-identifier-naming)

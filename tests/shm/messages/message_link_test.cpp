@@ -99,7 +99,7 @@ TEST_P(ArrayLengths, Cross) {
 INSTANTIATE_TEST_SUITE_P(OfEachKind, ArrayLengths, testing::Values(0, 2, 40, 10'000));
 
 TEST_F(MessageLinkTest, TheCmdOfALongRequestIsInItsSlot) {
-  for (const std::size_t length : {40, 10'000}) {  // in several slots, in a chunk
+  for (const std::size_t length : {40u, 10'000u}) {  // in several slots, in a chunk
     auto request = allocate(length);
     request->cmd = -7;
     ASSERT_TRUE(send(request) == LinkSend::sent || !request);
