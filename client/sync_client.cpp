@@ -33,7 +33,7 @@ SyncClient::SyncClient(const Backplane& backplane, const std::string& server, st
 
 void SyncClient::take(Message&& message) {
   const auto& route = message.route();
-  // A further reply may name the same id: that of a request 2^32 requests ago.
+  // A further reply to an earlier request has the same id if 2^32 requests were sent since.
   if (awaited_ != 0 && route.requestId == awaited_ && (route.flags & kEndsRequest) != 0) {
     awaited_ = 0;
     if (const auto* fate = message.tryAs<RequestFate>()) {

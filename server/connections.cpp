@@ -185,11 +185,15 @@ bool Connections::isConnected(const Route& request) noexcept {
   return link.peerState() == layout::LinkState::open && !link.peer()->isDead();
 }
 
-Route Connections::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
+Route Connections::routeTo(std::uint64_t client) const noexcept {
   const auto number = client >> 32;
   if (number == 0 || number > all_.size()) return {};
-  const Route route{reinterpret_cast<std::uint64_t>(all_[number - 1].get()), requestId,
-                    static_cast<std::uint32_t>(client), nullptr};
+  return {reinterpret_cast<std::uint64_t>(all_[number - 1].get()), 0,
+          static_cast<std::uint32_t>(client), nullptr};
+}
+
+Route Connections::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
+  const auto route = routeTo(client);
   auto* const connection = Connection::tryOf(route);
   if (connection == nullptr) return route;
   const BiasedLock::Guard lock(*connection->lock);
@@ -197,15 +201,15 @@ Route Connections::routeTo(std::uint64_t client, std::uint32_t requestId) const 
 }
 
 bool Connections::isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept {
-  const auto route = routeTo(client, requestId);
+  const auto route = routeTo(client);
   auto* const connection = Connection::tryOf(route);
   if (connection == nullptr) return false;
   const BiasedLock::Guard lock(*connection->lock);
-  return connection->isOpenFor(route) && connection->isUnanswered(route);
+  return connection->isOpenFor(route) && connection->isUnanswered(requestId);
 }
 
 std::vector<std::uint32_t> Connections::unanswered(std::uint64_t client) const {
-  const auto route = routeTo(client, 0);
+  const auto route = routeTo(client);
   std::vector<std::uint32_t> ids;
   const auto* const connection = Connection::tryOf(route);
   if (connection == nullptr) return ids;

@@ -57,7 +57,9 @@ class Connections {
   [[nodiscard]] static std::uint64_t clientOf(const Route& request) noexcept;
   // Whether that client is connected and alive.
   [[nodiscard]] static bool isConnected(const Route& request) noexcept;
-  // The route to a client; its link is 0 when no client ever had that number.
+  // The route to a client, of no request or of the request with this id; its link is 0 when no
+  // client ever had that number.
+  [[nodiscard]] Route routeTo(std::uint64_t client) const noexcept;
   [[nodiscard]] Route routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept;
   // Whether a request that was received has no reply; all such requests of a client.
   [[nodiscard]] bool isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept;

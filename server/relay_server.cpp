@@ -31,7 +31,7 @@ void RelayServer::refuse(std::uint64_t client, const MessageRun& run) noexcept {
 }
 std::size_t RelayServer::replyTo(std::uint64_t client, const MessageRun& run,
                                  bool isFirst) noexcept {
-  return core_->replies().sendRun(core_->connections().routeTo(client, 0), run, isFirst);
+  return core_->replies().sendRun(core_->connections().routeTo(client), run, isFirst);
 }
 bool RelayServer::isUnanswered(std::uint64_t client, std::uint32_t requestId) const noexcept {
   return core_->connections().isUnanswered(client, requestId);
@@ -40,7 +40,7 @@ std::vector<std::uint32_t> RelayServer::unanswered(std::uint64_t client) const {
   return core_->connections().unanswered(client);
 }
 BodyBytes RelayServer::allocateBody(std::uint64_t client, std::size_t bytes) {
-  return ReplySender::allocate(core_->connections().routeTo(client, 0), bytes);
+  return ReplySender::allocate(core_->connections().routeTo(client), bytes);
 }
 
 }  // namespace mpf

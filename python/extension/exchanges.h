@@ -5,6 +5,7 @@
 // Threads  one at a time; Requester guards them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -37,8 +38,9 @@ class Exchanges {
   void add(Exchange& exchange) { byId_.emplace(exchange.id, &exchange); }
   void remove(const Exchange& exchange) noexcept {
     const auto [first, last] = byId_.equal_range(exchange.id);
-    for (auto at = first; at != last; ++at)
-      if (at->second == &exchange) return static_cast<void>(byId_.erase(at));
+    const auto at =
+        std::find_if(first, last, [&](const auto& each) { return each.second == &exchange; });
+    if (at != last) byId_.erase(at);
   }
   void clear() noexcept { byId_.clear(); }
 
