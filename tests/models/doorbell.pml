@@ -60,8 +60,9 @@ byte rungFor;         // the number for which peer 0 has rung
 #define hasMessage (memory[SENT(0)] != taken[0] || memory[SENT(1)] != taken[1])
 #define hasLocalEvent (memory[LOCAL_EVENT] == 1 && !deathSeen)
 #define hasEvents (hasMessage || hasLocalEvent)
+#define hasEnded(peer) (senderEnded[peer] || dead[peer])
 #define allTaken (taken[0] == memory[SENT(0)] && taken[1] == memory[SENT(1)])
-#define allSeen (allTaken && senderEnded[0] && senderEnded[1] && isVisible(0) && isVisible(1) && deathSeen == (dead[0] || dead[1]))
+#define allSeen (allTaken && hasEnded(0) && hasEnded(1) && isVisible(0) && isVisible(1) && deathSeen == (dead[0] || dead[1]))
 
 // The comparison that FUTEX_WAIT makes.
 inline futexWait() {
@@ -78,20 +79,24 @@ inline ringBell(process) {
 #endif
   changed = true;
 #endif
-  isVisible(process);  // FUTEX_WAKE
-  asleep = false
+  isVisible(process)  // FUTEX_WAKE; the caller ends the sleep of the owner
 }
 
-// Only peer 0 sends two messages, so only it may have rung before. Its values after the last
-// message are not used.
-inline forget(process) {
-  d_step {
-    state = AWAKE;
-    if
-    :: process == 0 -> number = 0; if :: sent[0] == MESSAGES(0) -> rungFor = 0 :: else fi
-    :: else
-    fi
-  }
+// Only peer 0 sends two messages, so only it may have rung before. What a peer has read for a
+// message is not used after it.
+inline readNumber(peer) {
+  d_step { if :: peer == 0 -> number = memory[NUMBER] :: else fi }
+}
+inline noteRung(peer) {
+  if :: peer == 0 -> rungFor = number :: else fi
+}
+inline endMessage(peer) {
+  state = AWAKE;
+  senderEnded[peer] = (sent[peer] == MESSAGES(peer));
+  if
+  :: peer == 0 -> number = 0; rungFor = (senderEnded[peer] -> 0 : rungFor)
+  :: else
+  fi
 }
 #define hasRung (me == 0 && number != 0 && number == rungFor)
 
@@ -99,29 +104,34 @@ proctype Peer(byte me) {
   byte state;
   {
     do
-    :: sent[me] < MESSAGES(me) ->
+    :: !senderEnded[me] ->
       atomic { storeRelease(me, SENT(me), sent[me] + 1); sent[me]++ };
 #ifndef NO_PEER_FENCE
       fence(me);
 #endif
 #ifndef STATE_EARLY
-      if :: me == 0 -> number = memory[NUMBER] :: else fi;
+      readNumber(me);
 #endif
-      state = memory[SLEEPING];
+      atomic {
+        state = memory[SLEEPING];
 #ifdef STATE_EARLY
-      if :: me == 0 -> number = memory[NUMBER] :: else fi;
+      }
+      atomic {
+        readNumber(me);
 #endif
+        if
+        :: state == AWAKE || hasRung -> endMessage(me)
+        :: else
+        fi
+      };
       if
       :: state == AWAKE
-      :: state != AWAKE && hasRung
-      :: state == ON_FUTEX && !hasRung -> ringBell(me); if :: me == 0 -> rungFor = number :: else fi
-      :: state == ON_DESCRIPTOR && !hasRung -> readable = true; if :: me == 0 -> rungFor = number :: else fi
-      fi;
-      forget(me)
-    :: sent[me] == MESSAGES(me) -> break
+      :: state == ON_FUTEX -> ringBell(me); d_step { asleep = false; noteRung(me); endMessage(me) }
+      :: state == ON_DESCRIPTOR -> d_step { readable = true; noteRung(me); endMessage(me) }
+      fi
+    :: senderEnded[me] -> break
     od
-  } unless { dead[me] };
-  senderEnded[me] = true
+  } unless { dead[me] }
 }
 
 inline newNumber() {
@@ -211,6 +221,7 @@ end:
 #ifndef NO_DEATH_NEWS
   storeRelease(WATCHER, LOCAL_EVENT, 1);
   ringBell(WATCHER);
+  asleep = false;
   readable = true
 #endif
 }

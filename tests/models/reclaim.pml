@@ -77,15 +77,15 @@ inline becomeReaper(me) {
     mine = true
 #else
     if
-    :: beside[file] == FREE -> mine = true
-    :: else -> reaperOf[file] = FREE
+    :: d_step { beside[file] == FREE -> mine = true }
+    :: beside[file] != FREE -> reaperOf[file] = FREE
     fi
 #endif
 #endif
 #if !defined(NO_BESIDE) && !defined(NO_LOCK)
   :: d_step { lock[file] == FREE && !isByteFree(file) && beside[file] == FREE -> beside[file] = me } ->
     if
-    :: reaperOf[file] == FREE -> mine = true
+    :: d_step { reaperOf[file] == FREE -> mine = true }
     :: reaperOf[file] != FREE -> beside[file] = FREE
     fi
 #endif
@@ -94,16 +94,14 @@ inline becomeReaper(me) {
 }
 
 inline stopReaping(me) {
-  d_step {
-    if
-    :: reaperOf[file] == me -> reaperOf[file] = FREE
-    :: else
-    fi;
-    if
-    :: beside[file] == me -> beside[file] = FREE
-    :: else
-    fi
-  }
+  if
+  :: reaperOf[file] == me -> reaperOf[file] = FREE
+  :: else
+  fi;
+  if
+  :: beside[file] == me -> beside[file] = FREE
+  :: else
+  fi
 }
 
 inline removeIfOwnerless(me) {
@@ -119,7 +117,7 @@ inline removeIfOwnerless(me) {
       :: name == file ->
 #endif
 #ifdef UNLOCK_EARLY
-        stopReaping(me);
+        d_step { stopReaping(me) };
 #endif
         removeName(NO_FILE)
 #ifndef NO_COMPARE
@@ -128,11 +126,10 @@ inline removeIfOwnerless(me) {
 #else
       ;
 #endif
-      stopReaping(me)
+      d_step { stopReaping(me); mine = false }
     :: else
     fi
   fi;
-  mine = false;
   file = NO_FILE
 }
 
@@ -152,7 +149,11 @@ proctype Starter(byte me) {
 #endif
     do
     :: d_step { name == NO_FILE -> name = fileOf(me) } -> goto owner
-    :: atomic { isLocked -> assert(isLiving(name)) } -> goto refused
+    :: atomic {
+         isLocked -> assert(isLiving(name));
+         left[me] = true;
+         lock[fileOf(me)] = FREE
+       } -> goto done  // refused
 #ifndef NO_REAPING
     :: name != NO_FILE && isReapable(name) -> removeIfOwnerless(me)
 #endif
@@ -161,22 +162,15 @@ owner:
 #ifdef LOCK_LATE
     lock[fileOf(me)] = me;
 #endif
-    // Two owners would be two living processes that have the name.
-    assert(name == fileOf(me));
-    if
-    :: skip  // may leave at any time
-    :: dead[me]
-    fi;
-#ifdef LEAVE_LATE
-    d_step { left[me] = true; lock[fileOf(me)] = FREE };
-    removeName(fileOf(me));
-#else
-    removeName(fileOf(me));
-    d_step { left[me] = true; lock[fileOf(me)] = FREE };
+#ifndef LEAVE_LATE
+    removeName(fileOf(me));  // at any time
 #endif
-refused:
-    skip;
-    d_step { left[me] = true; lock[fileOf(me)] = FREE }
+    atomic { left[me] = true; lock[fileOf(me)] = FREE };
+#ifdef LEAVE_LATE
+    removeName(fileOf(me));
+#endif
+done:
+    skip
   } unless { dead[me] }
 }
 
