@@ -117,11 +117,10 @@ class Caller {
   [[nodiscard]] std::string whyNot(const Answer& answer) const {
     auto why = answer.why();
     if (answer.refusal() != SendResult::notConnected) return why;
-    if (why.find("not running") != std::string::npos) {
-      const auto router = whyUnreachable(
-          Snapshot::take(Backplane::named(arguments_.backplane).name()), arguments_.location);
-      if (!router.empty()) why += ": " + router;
-    }
+    const auto router =
+        whyUnreachable(Snapshot::take(Backplane::named(arguments_.backplane).name()),
+                       arguments_.server, arguments_.location);
+    if (!router.empty()) why += ": " + router;
     return why + "; `mpf ls` shows all servers";
   }
 

@@ -9,6 +9,12 @@
 namespace mpf::tools {
 namespace {
 
+bool isReachable(const Snapshot& snapshot, std::string_view server, std::int32_t location) {
+  return std::ranges::any_of(snapshot.servers, [&](const WindowView& view) {
+    return view.name == server && view.location == location && view.life != Life::dead;
+  });
+}
+
 bool isOfThisHost(const Snapshot& snapshot, std::int32_t location) {
   return location == 0 || std::ranges::any_of(snapshot.servers, [&](const WindowView& server) {
            return server.location == location && server.router == 0;
@@ -29,8 +35,9 @@ std::string reasonOf(const RouterView& router, const RouterLineView& line) {
 
 }  // namespace
 
-std::string whyUnreachable(const Snapshot& snapshot, std::int32_t location) {
-  if (isOfThisHost(snapshot, location)) return {};
+std::string whyUnreachable(const Snapshot& snapshot, std::string_view server,
+                           std::int32_t location) {
+  if (isReachable(snapshot, server, location) || isOfThisHost(snapshot, location)) return {};
   std::string text = fmt::format("no router of this host has a remote with location {}", location);
   for (const auto& router : snapshot.routers) {
     for (const auto& line : router.lines) {

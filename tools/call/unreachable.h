@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// whyUnreachable(): why clients cannot reach servers at a location, as far as the routers of the
+// whyUnreachable(): why clients cannot reach a server on another host, as far as the routers of the
 // backplane tell.
 //
 // Threads  any.
@@ -7,12 +7,14 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "tools/report/snapshot.h"
 
 namespace mpf::tools {
 
-// Empty: `location` is that of servers of this host, or nothing is known.
-[[nodiscard]] std::string whyUnreachable(const Snapshot& snapshot, std::int32_t location);
+// Empty: the server has a window on this host, or `location` is that of servers of this host.
+[[nodiscard]] std::string whyUnreachable(const Snapshot& snapshot, std::string_view server,
+                                         std::int32_t location);
 
 }  // namespace mpf::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Why a location cannot be reached, from the rows of a router.
+// Why a server cannot be reached, from the rows of a router.
 #include "tools/call/unreachable.h"
 
 #include <mpf/message_server.h>
@@ -13,7 +13,7 @@ namespace {
 class WhyUnreachableTest : public test::ShmTest {
  protected:
   [[nodiscard]] std::string why(std::int32_t location) const {
-    return whyUnreachable(Snapshot::take(name()), location);
+    return whyUnreachable(Snapshot::take(name()), "echo", location);
   }
 };
 
@@ -45,6 +45,23 @@ TEST_F(WhyUnreachableTest, TheOtherHostHasNoSuchServerOrRefuses) {
   EXPECT_EQ(why(2),
             "the router is connected to ioc1: no server of this name runs there, or the [[allow]] "
             "rules of ioc1 refuse it");
+}
+
+TEST_F(WhyUnreachableTest, AServerWithAWindowIsReachable) {
+  router::Statistics statistics(backplane_, "lab1");
+  const auto remote = test::connectedRemote(statistics, {2});
+  auto snapshot = Snapshot::take(name());
+  WindowView window;  // of the router
+  window.name = "echo";
+  window.location = 2;
+  window.router = 1;
+  snapshot.servers.push_back(window);
+
+  EXPECT_EQ(whyUnreachable(snapshot, "echo", 2), "");
+  EXPECT_NE(whyUnreachable(snapshot, "other", 2), "");
+
+  snapshot.servers.back().life = Life::dead;
+  EXPECT_NE(whyUnreachable(snapshot, "echo", 2), "");
 }
 
 }  // namespace
