@@ -18,6 +18,7 @@
 
 #include "base/process_stat.h"
 #include "base/system_call.h"
+#include "base/toml/config_errors.h"
 
 namespace mpf::crate {
 namespace {
@@ -113,6 +114,7 @@ nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& re
     throwSystemError(errno, "send", folder.file("control"));
   auto reply =
       nlohmann::json::parse(readLine(socket.get(), Deadline::after(patience), folder.name()));
+  if (reply.contains("fileErrors")) throw ConfigError(reply.at("fileErrors").get<std::string>());
   if (reply.contains("error")) throw std::runtime_error(reply.at("error").get<std::string>());
   return reply;
 } catch (const std::system_error& error) {

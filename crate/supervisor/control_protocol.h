@@ -4,7 +4,9 @@
 //
 //   {"do": "ps"}                        {"processes": [{"name", "state", "pid", ...}], ...}
 //   {"do": "restart", "name": "dac"}    {} or {"error": "..."}
-//   also "start", "stop", "reload", and "shutdown" for the whole crate
+//   {"do": "reload"}                    {"changed": [NAMES]}, {"error": "..."}, or
+//                                       {"fileErrors": "..."}: the text of a ConfigError
+//   also "start", "stop", and "shutdown" for the whole crate
 //
 // Threads  one.
 // Trust    only the user of the supervisor can connect; a request that is no JSON gets an error.
@@ -29,7 +31,8 @@ inline constexpr std::size_t kMaxRequestBytes = 65536;
 
 // Sends a request to the supervisor and returns its reply.
 //   throws  std::runtime_error when no supervisor runs, when it is stopped, when it does not reply
-//           within `patience`, or with the error that it replied
+//           within `patience`, or with the error that it replied; ConfigError when the crate file
+//           has errors
 nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& request,
                              std::chrono::milliseconds patience = std::chrono::seconds(30));
 

@@ -8,6 +8,8 @@
 #include <array>
 #include <cerrno>
 
+#include "base/toml/config_errors.h"
+
 namespace mpf::crate {
 namespace {
 
@@ -73,6 +75,8 @@ bool ControlServer::serve(Caller& caller) {
     return length != 0 && caller.request.size() < kMaxRequestBytes;
   try {
     sendReply(caller.socket, answer_(nlohmann::json::parse(caller.request)));
+  } catch (const ConfigError& errors) {
+    sendReply(caller.socket, {{"fileErrors", errors.what()}});
   } catch (const std::exception& error) {
     sendReply(caller.socket, {{"error", error.what()}});
   }

@@ -59,6 +59,17 @@ TEST_F(ControlTest, AReloadSaysWhichProcessFails) {
   EXPECT_THAT(result.output, HasSubstr("mpf reload: wrong has failed: exit status 2"));
 }
 
+TEST_F(ControlTest, AReloadNamesEachErrorOfTheFile) {
+  run(kServer);
+  write(kServer + "first = 1\nsecond = 2\n");
+
+  const auto result = runCommand(MPF " reload 2>&1 >/dev/null");
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 2);
+  EXPECT_THAT(result.output, testing::MatchesRegex("mpf reload: [^\n]*\"first\"[^\n]*\n"
+                                                   "mpf reload: [^\n]*\"second\"[^\n]*\n"));
+}
+
 TEST_F(ControlTest, AProgramThatDoesNotReportIsLookedAtForASecond) {
   run("[[program]]\nname = \"mute\"\ncommand = [\"sleep\", \"1000\"]\n");
   waitForState("mute", "ready");
