@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// ControlServer: the supervisor's end of the ControlProtocol. It waits for no caller: a request
-// that arrives in pieces is collected, and a reply that a caller does not read is cut off. When the
-// process has no file descriptor left, a caller gets an error.
+// ControlServer: the supervisor's end of the ControlProtocol. It waits for no caller: requests
+// arrive, and replies leave, in pieces. When the process has no file descriptor left, a caller gets
+// an error.
 //
 // Threads  one.
-// Trust    a caller may send anything, or nothing: callers and requests are limited.
+// Trust    a caller may send anything, or nothing, or not read its reply: callers and requests are
+//          limited.
 #pragma once
 
 #include <poll.h>
@@ -29,17 +30,21 @@ class ControlServer {
 
   // Adds its descriptors to those for poll().
   void addTo(std::vector<pollfd>& polled) const;
-  // Serves the callers whose descriptors, in the order of addTo(), are readable.
+  // Serves the callers whose descriptors, in the order of addTo(), are ready.
   void handle(const std::vector<pollfd>& polled);
 
  private:
   struct Caller {
     FileDescriptor socket;
     std::string request;
+    std::string reply;  // the part that is not sent yet
   };
   void accept();
   void refuseCaller();
   [[nodiscard]] bool serve(Caller& caller);
+  [[nodiscard]] bool receive(Caller& caller);
+  [[nodiscard]] static bool sendSome(Caller& caller);
+  [[nodiscard]] nlohmann::json replyTo(const std::string& request);
 
   Answer answer_;
   FileDescriptor listening_;

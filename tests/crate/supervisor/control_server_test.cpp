@@ -7,6 +7,8 @@
 #include <sys/un.h>
 
 #include <array>
+#include <chrono>
+#include <future>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <string>
@@ -56,8 +58,11 @@ class ControlServerTest : public testing::Test {
   const mpf::test::Watchdog watchdog_{"ControlServer"};
   mpf::test::TemporaryFolder parent_;
   CrateFolder folder_{parent_.path() / "lab"};
-  ControlServer server_{
-      [](const nlohmann::json& request) -> nlohmann::json { return {{"done", request.at("do")}}; }};
+  static constexpr std::size_t kLong = 3'000'000;
+  ControlServer server_{[](const nlohmann::json& request) -> nlohmann::json {
+    if (request.at("do") == "long") return {{"done", std::string(kLong, 'x')}};
+    return {{"done", request.at("do")}};
+  }};
 };
 
 TEST_F(ControlServerTest, RepliesToARequestInPieces) {
@@ -79,6 +84,23 @@ TEST_F(ControlServerTest, RepliesAnErrorToARequestThatItCannotRead) {
   }
 
   EXPECT_THAT(replyTo(caller), HasSubstr("{\"error\":\""));
+}
+
+// A reply to a caller that does not read it at once is longer than the buffer of its socket.
+TEST_F(ControlServerTest, ALongReplyArrivesWhole) {
+  const auto slow = call();
+  send(slow, "{\"do\": \"long\"}\n");
+  while (step()) {
+  }
+  const auto other = call();
+  send(other, "{\"do\": 1}\n");
+  while (step()) {
+  }
+  EXPECT_EQ(replyTo(other), "{\"done\":1}\n");
+
+  auto reply = std::async(std::launch::async, [&] { return replyTo(slow); });
+  while (reply.wait_for(std::chrono::seconds(0)) != std::future_status::ready) step();
+  EXPECT_EQ(reply.get().size(), kLong + std::string_view("{\"done\":\"\"}\n").size());
 }
 
 TEST_F(ControlServerTest, ACallerGetsAnErrorWhenNoDescriptorIsLeft) {
