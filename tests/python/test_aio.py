@@ -137,6 +137,22 @@ async def test_a_subscription_whose_first_reply_is_late_times_out(silent: Silent
             await anext(client.subscribe(mpf.Int32(), timeout=0.2))
 
 
+async def test_a_wait_for_the_first_reply_may_be_cancelled(silent: Silent) -> None:
+    server, requests, came = silent
+    async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
+        replies = client.subscribe(mpf.Int32())
+        waiting = asyncio.ensure_future(anext(replies))
+        await came.wait()
+        waiting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+        server.reply(requests[0], mpf.Int32(5))
+        server.reply(requests[0], mpf.Int32(6))
+
+        assert [(await anext(replies)).value, (await anext(replies)).value] == [5, 6]
+    assert len(requests) == 1
+
+
 async def test_a_subscription_iterates(doubler: mpf.Server) -> None:
     doubler.on(mpf.Float64)(lambda request: (float(n) for n in range(4)))
     values = []

@@ -298,6 +298,23 @@ def test_ctrl_c_ends_a_subscription(doubler: mpf.Server) -> None:
             next(replies)
 
 
+def test_a_subscription_goes_on_after_ctrl_c(silent: Silent) -> None:
+    def serve() -> None:
+        assert silent.came.acquire(timeout=PATIENCE)
+        os.kill(os.getpid(), signal.SIGINT)
+        assert silent.came.acquire(timeout=PATIENCE)
+        silent.server.reply(silent.requests[1], mpf.Int32(5))
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    with mpf.Client("silent", timeout=PATIENCE) as client:
+        replies = client.subscribe(mpf.Int32())
+        with pytest.raises(KeyboardInterrupt):
+            next(replies)
+        assert next(replies).value == 5
+    thread.join()
+
+
 def test_ctrl_c_ends_a_server() -> None:
     server = mpf.Server("tested")
     server.on(mpf.Int32)(lambda request: 1)

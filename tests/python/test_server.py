@@ -223,7 +223,19 @@ def test_a_generator_without_values_refuses_the_request(server: mpf.Server) -> N
         call(mpf.Int32())
 
 
-ERRORS = [Exception("\ud800"), mpf.StatusError("", status=1 << 40), mpf.StatusError("", status=0)]
+class Mute(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+
+ERRORS = [
+    Exception("\ud800"),
+    Mute(),
+    mpf.StatusError("", status=1 << 40),
+    mpf.StatusError("", status=0),
+    mpf.StatusError("", status="7"),  # type: ignore[arg-type]
+    mpf.StatusError(OSError(5, "dead")),  # type: ignore[arg-type]
+]
 
 
 @pytest.mark.parametrize("error", ERRORS)

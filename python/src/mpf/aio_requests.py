@@ -75,7 +75,13 @@ class AsyncRequest:
 
 
 class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
-    """The replies to one request; AsyncClient.subscribe() creates it."""
+    """The replies to one request; AsyncClient.subscribe() creates it.
+
+    Cancelling a wait for a reply, for example with asyncio.wait_for(), loses no reply: the next wait
+    continues.
+    """
+
+    _hasFirst = False  # the request has had its first reply
 
     async def __aenter__(self: Self) -> Self:
         return self
@@ -93,7 +99,7 @@ class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
 
     async def __anext__(self) -> M:
         while not self._isClosed:
-            message = await (self._first() if self._request is None else self._further())
+            message = await (self._further() if self._hasFirst else self._first())
             if message is not None:
                 return message
             if not self._renew:
@@ -109,20 +115,24 @@ class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
     async def _first(self) -> M | None:
         client = self._client
         limit = client._until(self._timeout)
-        while not client.connected and await client._changed(CONNECTION, limit):
-            if self._isClosed:
-                return None
-        request = await client._start(
-            self._message, limit, reply=self._reply, further=self._limit
-        )
-        self._begin(request)
+        request = self._request  # not None after a wait that was cancelled
+        if request is None:
+            while not client.connected and await client._changed(CONNECTION, limit):
+                if self._isClosed:
+                    return None
+            request = await client._start(
+                self._message, limit, reply=self._reply, further=self._limit
+            )
+            self._begin(request)
         try:
-            return cast(M, await client._end(request, limit, True))
+            message = await client._end(request, limit, True)
         except Error as error:
             self._drop()
             if self._hasEnded(error):
                 return None
             raise
+        self._hasFirst = self._request is request
+        return cast(M, message)
 
     async def _further(self) -> M | None:
         limit = self._client._until(self._timeout)
@@ -138,6 +148,7 @@ class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
 
     def _drop(self) -> None:
         request = self._request
+        self._hasFirst = False
         super()._drop()
         if request is not None:
             self._client._wake(request.id)

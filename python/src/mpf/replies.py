@@ -31,12 +31,9 @@ def with_value(request: Message, value: object) -> Message:
 
 def of_error(request: Message, error: Exception) -> Char8Array:
     """The reply to a request whose handler has raised this exception."""
-    if isinstance(error, StatusError):
-        status, text = _status_of(error), error.text
-    else:
-        status, text = -1, f"{type(error).__name__}: {error}"
+    status = _status_of(error) if isinstance(error, StatusError) else -1
     fields: dict[str, Any] = {**fields_of(request), "status": status}
-    return Char8Array(text.encode("utf-8", "backslashreplace"), **fields)
+    return Char8Array(_text_of(error).encode("utf-8", "backslashreplace"), **fields)
 
 
 def fields_of(message: Message) -> dict[str, Any]:
@@ -46,5 +43,14 @@ def fields_of(message: Message) -> dict[str, Any]:
 
 
 def _status_of(error: StatusError) -> int:
-    isStatus = error.status != 0 and -(2**31) <= error.status < 2**31
+    status: object = error.status
+    isStatus = isinstance(status, int) and status != 0 and -(2**31) <= status < 2**31
     return error.status if isStatus else -1
+
+
+def _text_of(error: Exception) -> str:
+    kind = type(error).__name__
+    try:  # what a program raises need not have a text
+        return str(error.text) if isinstance(error, StatusError) else f"{kind}: {error}"
+    except Exception:
+        return kind

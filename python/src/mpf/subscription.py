@@ -102,9 +102,9 @@ class Subscription(SubscriptionBase["Client", M]):
         self._begin(request)
         try:
             return cast(M, request.wait())
-        except Error as error:
+        except BaseException as error:  # also Ctrl-C, which has cancelled the request
             self._drop()
-            if self._hasEnded(error):
+            if isinstance(error, Error) and self._hasEnded(error):
                 return None
             raise
 
