@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -66,7 +67,10 @@ def test_the_text_and_the_status_of_the_server_are_the_exception(doubler: mpf.Se
             client.float64(address=7)
         reply = client.call(mpf.Float64(address=7), check=False)
 
-    assert (caught.value.status, caught.value.text) == (-3, "no channel 7")
+    copy = pickle.loads(pickle.dumps(caught.value))
+    for error in (caught.value, copy):
+        assert (error.status, error.text) == (-3, "no channel 7")
+    assert (type(copy), str(copy), copy.reply) == (mpf.StatusError, str(caught.value), None)
     assert (reply.status, reply.text, reply.address) == (-3, "no channel 7", 7)
 
 
@@ -82,6 +86,7 @@ def test_a_reply_of_another_type_is_an_error_unless_it_is_expected(doubler: mpf.
         anything = client.call(mpf.Float64(), reply=mpf.Message)
 
     assert isinstance(caught.value.reply, mpf.Int32)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
     assert expected.value == 7
     assert isinstance(anything, mpf.Int32)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import tty
@@ -108,9 +109,15 @@ def test_an_absent_gpib_instrument_is_an_error(bus: None) -> None:
 def test_an_absent_server_is_an_error_whatever_the_instrument_may_take(
     act: Callable[[mpf.Serial], object],
 ) -> None:
-    with mpf.Serial("nobody", timeout=1e6, queue_timeout=0.01) as meter:
-        with pytest.raises(mpf.NotConnected, match="nobody"):
-            act(meter)
+    for longest in (1e6, math.inf):
+        with mpf.Serial("nobody", timeout=longest, queue_timeout=0.01) as meter:
+            with pytest.raises(mpf.NotConnected, match="nobody"):
+                act(meter)
+
+
+def test_nan_is_not_a_time() -> None:
+    with mpf.Serial("nobody") as meter, pytest.raises(ValueError, match="timeout: NaN"):
+        meter.query("VOLT?\r", timeout=math.nan)
 
 
 def test_an_operation_that_waits_for_others_expires(silent: Silent) -> None:

@@ -17,14 +17,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from mpf._mpf import Char8Array, Message
 
 
 class Error(Exception):
-    """Any failure that this package reports."""
+    """Any failure that this package reports. It can be pickled; a reply is None in the copy."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        attributes = dict(self.__dict__)
+        if "reply" in attributes:
+            attributes["reply"] = None
+        return _copy, (type(self), self.args, attributes)
 
 
 class NotSent(Error):
@@ -88,8 +94,8 @@ class UnexpectedReply(Error):
     """The reply is of another class than the call expects."""
 
     def __init__(self, server: str, reply: Message) -> None:
-        #: The reply.
-        self.reply = reply
+        #: The reply; None in a copy.
+        self.reply: Message | None = reply
         super().__init__(
             f"{server}: the reply is a {type(reply).__name__}; "
             f"pass reply=mpf.{type(reply).__name__} if you expect it"
@@ -108,7 +114,7 @@ class StatusError(Error):
     """
 
     def __init__(self, text: str, reply: Message | None = None, *, status: int = -1) -> None:
-        #: The reply, or None if a handler raised the exception.
+        #: The reply; None if a handler raised the exception, and in a copy.
         self.reply = reply
         #: The status of the reply.
         self.status: int = status if reply is None else getattr(reply, "status")
@@ -137,6 +143,12 @@ class InstrumentTimeout(InstrumentError, TimeoutError):
 def is_end_of_server(error: Error) -> bool:
     """Whether the connection has ended: the request may be sent again to the next server."""
     return isinstance(error, (NeverTaken, OutcomeUnknown)) and not isinstance(error, TimeoutError)
+
+
+def _copy(kind: type[Error], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> Error:
+    error = kind.__new__(kind, *arguments)
+    error.__dict__.update(attributes)
+    return error
 
 
 def _text_of(reply: Message) -> str:

@@ -29,6 +29,7 @@ _FLUSH, _SET_EOM, _MILLISECONDS = 0x10, 0x80, 0x100
 _LEASE, _UNLEASE = 12, 13
 _TIMEOUT = 1  # the status of both servers
 QUEUE_TIMEOUT = 5.0  # [s]
+_LONGEST = 2_147_483.0  # [s] what a request can say
 
 _SERIAL_STATUS = {
     1: "no complete answer in time",
@@ -44,6 +45,12 @@ _GPIB_STATUS = {
     6: "another client has the bus to itself",
     7: "the request is invalid",
 }
+
+
+def _milliseconds(seconds: float) -> int:
+    if math.isnan(seconds):
+        raise ValueError("timeout: NaN is not a time")
+    return max(1, math.ceil(min(seconds, _LONGEST) * 1000))
 
 
 class Instrument:
@@ -144,7 +151,7 @@ class Instrument:
             cmd=cmd | _MILLISECONDS | self._eom_options(eom),
             address=self.address,
             extra=extra,
-            timeout=max(1, math.ceil(limit * 1000)),
+            timeout=_milliseconds(limit),
             eom=eom,
         )
         reply = self._call(request, limit, reply=Char8Array, check=False)
@@ -154,7 +161,6 @@ class Instrument:
             reason = self._status_texts.get(reply.status, f"status {reply.status}")
             raise kind(f"{self.client.server}: {reason}", reply)
         return reply
-
 
     def _call(self, request: Message, limit: float, **options: Any) -> Message:
         # Without a connection, call() raises the reason at once.

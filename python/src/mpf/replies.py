@@ -43,7 +43,7 @@ def fields_of(message: Message) -> dict[str, Any]:
 
 
 def _status_of(error: StatusError) -> int:
-    status: object = error.status
+    status: Any = error.status
     isStatus = isinstance(status, int) and status != 0 and -(2**31) <= status < 2**31
     return error.status if isStatus else -1
 
