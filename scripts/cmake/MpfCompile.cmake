@@ -34,9 +34,9 @@ target_compile_options(mpf_warnings INTERFACE $<$<CONFIG:Release>:-Wno-restrict>
 
 if(CMAKE_CXX_COMPILER_ID STREQUAL Clang) # for fuzzing
   add_compile_options("SHELL:-include ${CMAKE_SOURCE_DIR}/scripts/kj_for_clang.h")
-  # In libstdc++ 12 itself, and in macros of KJ.
+  # In libstdc++ 12 itself, in macros of KJ, and with names of other sources in the same unit.
   target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations
-    -Wno-gnu-statement-expression-from-macro-expansion)
+    -Wno-gnu-statement-expression-from-macro-expansion -Wno-shadow)
 endif()
 
 set(MPF_SANITIZE "" CACHE STRING
