@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+import os
+import select
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -117,6 +121,34 @@ def test_a_ghost_that_has_died_is_an_error(doubler: mpf.Server, tmp_path: Path) 
     ghost._process.kill()
     with pytest.raises(mpf.Error):
         ghost.close()
+
+
+OF_A_PROGRAM = """
+import signal, sys, mpf
+if sys.argv[1] == "record":
+    running = mpf.record("doubler", sys.argv[2])
+else:
+    running = mpf.replay(sys.argv[2], "ghost")
+print(running._process.pid, flush=True)
+signal.pause()
+"""
+
+
+@pytest.mark.parametrize("what", ["record", "replay"])
+def test_what_a_program_started_ends_with_it(
+    doubler: mpf.Server, tmp_path: Path, what: str
+) -> None:
+    file = tmp_path / "calls.mpf"
+    with mpf.Client("doubler") as client, mpf.record("doubler", file):
+        client.int32(timeout=PATIENCE)
+    command = [sys.executable, "-B", "-c", OF_A_PROGRAM, what, str(file)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as user:
+        assert user.stdout is not None
+        started = os.pidfd_open(int(user.stdout.readline()))
+        user.kill()
+
+    assert select.select([started], [], [], PATIENCE)[0]
+    os.close(started)
 
 
 def test_a_file_that_is_no_recording_is_an_error(tmp_path: Path) -> None:

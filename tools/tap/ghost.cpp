@@ -8,6 +8,7 @@
 #include "base/print_error.h"
 #include "base/stop_signals.h"
 #include "tools/tap/ghost_server.h"
+#include "tools/tap/reader_watch.h"
 #include "tools/text/json_text.h"
 #include "tools/text/wrap.h"
 
@@ -54,6 +55,7 @@ int serveGhost(const GhostOptions& options) {
                     script, options.speed);
   const StopSignals stop([](void* self) noexcept { static_cast<GhostServer*>(self)->stop(); },
                          &ghost);
+  const ReaderWatch reader([&ghost] { ghost.stop(); });
   announce(options, name, script);
   ghost.run();
   report(ghost.counts(), options.json);

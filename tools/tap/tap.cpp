@@ -15,6 +15,7 @@
 #include "tools/arguments.h"
 #include "tools/commands.h"
 #include "tools/inspect/dissect.h"
+#include "tools/tap/reader_watch.h"
 #include "tools/tap/tap_session.h"
 #include "tools/text/wrap.h"
 
@@ -54,6 +55,7 @@ int tap(const TapArguments& arguments) {
   std::atomic<bool> stopped{false};
   const StopSignals stop(
       [](void* flag) noexcept { static_cast<std::atomic<bool>*>(flag)->store(true); }, &stopped);
+  const ReaderWatch reader([&stopped] { stopped = true; });
   const auto link = parseLink(arguments.link);
   const auto sink = sinkFor(arguments);
   TapSession session(

@@ -77,8 +77,8 @@ class AsyncRequest:
 class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
     """The replies to one request; AsyncClient.subscribe() creates it.
 
-    Cancelling a wait for a reply, for example with asyncio.wait_for(), loses no reply: the next wait
-    continues.
+    Cancelling a wait for a reply, for example with asyncio.wait_for(), loses no reply: the next
+    wait continues.
     """
 
     _hasFirst = False  # the request has had its first reply

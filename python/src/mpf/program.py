@@ -10,6 +10,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+_PATIENCE = 10.0  # [s] for a program to end by itself
+
 
 def find() -> str:
     """The program `mpf` of this package, or else of PATH.
@@ -29,17 +31,22 @@ def command(arguments: Sequence[str]) -> list[str]:
 
 
 def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
-    """Starts the program; its stdout and stderr are pipes."""
+    """Starts the program; its stdout and stderr are pipes. `tap` and `replay` end with this
+    process: then their stdout has no reader."""
     return subprocess.Popen(
         command(arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
 
 
 def stop(process: subprocess.Popen[str]) -> None:
-    """Ends the program, and waits until it has ended."""
+    """Ends the program, and waits until it has ended. One that is stopped is killed."""
     if process.poll() is None:
         process.terminate()
-    process.communicate()
+    try:
+        process.communicate(timeout=_PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
 
 
 def error_of(process: subprocess.Popen[str]) -> str:
