@@ -17,6 +17,7 @@
 
 #include <chrono>
 #include <compare>
+#include <concepts>
 #include <cstdint>
 
 #include <mpf/detail/cpp20.h>
@@ -61,6 +62,13 @@ class Deadline {
   [[nodiscard]] static Deadline after(Nanoseconds wait) noexcept {
     const auto now = Clock::nowNs();
     return wait.count() >= kNever - now ? never() : Deadline(now + wait.count());
+  }
+  // The same for other units: a number that does not fit into Nanoseconds is not converted.
+  template <std::integral Rep, class Period>
+  [[nodiscard]] static Deadline after(std::chrono::duration<Rep, Period> wait) noexcept {
+    using Fraction = std::chrono::duration<double, std::nano>;
+    if (Fraction(wait) >= Fraction(Nanoseconds::max())) return never();
+    return after(wait.count() <= 0 ? Nanoseconds(0) : Nanoseconds(wait));
   }
   // A deadline at this CLOCK_MONOTONIC [ns]; INT64_MAX means never(). Processes of one host may
   // exchange such times.
