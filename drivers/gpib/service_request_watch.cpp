@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include <mpf/clock.h>
+
 #include "base/signals_blocked.h"
 
 namespace mpf {
@@ -47,22 +49,23 @@ std::shared_ptr<void> ServiceRequestWatch::add(std::function<void()> handler) {
 }
 
 void ServiceRequestWatch::run() {
-  for (bool isActive = false;;) {
+  for (bool isActive = false, isUnknown = false;;) {
     const bool hasHandlers = !handlers_.isEmpty();
     bool isReported = false;
     {
       std::unique_lock lock(mutex_);
       const auto isCalled = [this] { return ends_ || hasReport_ || hasNewHandler_; };
-      if (hasHandlers && (isActive || !isControllerReporting_)) {
-        changed_.wait_for(lock, every_, isCalled);
-      } else {
-        changed_.wait(lock, isCalled);
-      }
+      const bool looksAgain = hasHandlers && (isActive || isUnknown || !isControllerReporting_);
+      const auto again = looksAgain ? Deadline::after(every_) : Deadline::never();
+      if (again.isNever()) changed_.wait(lock, isCalled);
+      else changed_.wait_for(lock, again.left(), isCalled);
       if (ends_) return;
       hasNewHandler_ = false;
       isReported = std::exchange(hasReport_, false);
     }
-    isActive = isReported || (!handlers_.isEmpty() && isActive_().value_or(isActive));
+    const auto line = isReported || handlers_.isEmpty() ? std::optional(isReported) : isActive_();
+    isUnknown = !line;  // the bus was busy; the controller may have reported the line before
+    isActive = line.value_or(isActive);
     if (isActive) handlers_.call();
   }
 }

@@ -7,6 +7,8 @@
 #include <thread>
 #include <utility>
 
+#include "drivers/gpib/bus_lines.h"
+
 namespace mpf {
 namespace {
 
@@ -68,7 +70,16 @@ std::string Ti9914Chip::setUp() {
   }
   pulseInterfaceClear();
   setState(kSre, isRemoteEnabled);
+  noteActiveServiceRequest();
   return {};
+}
+
+// The reset has dropped the event of a line that is active already.
+void Ti9914Chip::noteActiveServiceRequest() {
+  if ((lines() & gpib_line::kSrq) == 0) return;
+  const std::lock_guard lock(mutex_);
+  events_ |= kServiceRequest;
+  thread_.wake();
 }
 
 bool Ti9914Chip::isLost() const {

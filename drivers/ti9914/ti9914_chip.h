@@ -83,6 +83,7 @@ class Ti9914Chip {
 
   // Sends IFC.
   void pulseInterfaceClear();
+  void noteActiveServiceRequest();
   void write(std::uint8_t byte);  // CDOR
   [[nodiscard]] std::uint8_t read();  // DIR
   // The active lines of the bus, of gpib_line.

@@ -74,6 +74,18 @@ TEST_F(ServiceRequestWatchTest, ALineThatCannotBeSeenIsStillActive) {
   waitFor(calls_, 3);
 }
 
+TEST_F(ServiceRequestWatchTest, ANewHandlerOfABusyBusLearnsOfAnActiveLineLater) {
+  watch_.setReported(true);
+  isActive_ = true;  // its report was before
+  isBusy_ = true;
+  const auto entry = watch_.add([this] { ++calls_; });
+  waitFor(looks_, 1);
+
+  isBusy_ = false;
+
+  waitFor(calls_, 1);
+}
+
 TEST_F(ServiceRequestWatchTest, AReportedLineIsLookedAtWhileItIsActive) {
   watch_.setReported(true);
   const auto entry = watch_.add([this] { ++calls_; });

@@ -333,6 +333,18 @@ TEST_F(Ti9914ControllerTest, ReportsAModuleThatIsAbsentAndUsesItAgain) {
   EXPECT_EQ(readLine(kMeter), "-8.874270409E-01\r\n");
 }
 
+TEST_F(Ti9914ControllerTest, ReportsARequestThatBeganWhileTheModuleWasAbsent) {
+  RequestCount requests(gpib());
+  carrier_.setFault("IP_a", ModelFault::busError);
+  EXPECT_EQ(send(kMemory, "x").status, GpibStatus::failure);
+  bus_->access([&](const GpibLines& /*lines*/) { second_->requestService(0); });
+  carrier_.setFault("IP_a", ModelFault::none);
+
+  EXPECT_TRUE(send(kMemory, "x").ok());
+
+  requests.waitFor(1);
+}
+
 TEST_F(Ti9914ControllerTest, NamesItselfByModuleAndPlace) {
   EXPECT_EQ(gpib().description(), "TI9914 a-ip488 (carrier ipac, site IP_a)");
 }
