@@ -11,12 +11,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <chrono>
 #include <climits>
 #include <cstddef>
 #include <fmt/format.h>
 #include <stdexcept>
+#include <thread>
 #include <type_traits>
 #include <utility>
+
+#include <mpf/clock.h>
 
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
@@ -72,11 +77,19 @@ static_assert(std::is_standard_layout_v<ModelWiresFile> &&
 
 namespace {
 
-// A lock between processes; the kernel releases it when the process ends.
+// A lock between processes, which hold it for microseconds, unless one is stopped meanwhile; the
+// kernel releases it when the process ends.
 class FileLock {
  public:
   FileLock(int fd, const std::string& path) : fd_(fd) {
-    checkCall(retryInterrupted([&] { return ::flock(fd, LOCK_EX); }), "lock", path);
+    const auto deadline = Deadline::after(std::chrono::seconds(2));
+    while (::flock(fd, LOCK_EX | LOCK_NB) < 0) {
+      if (errno != EWOULDBLOCK && errno != EINTR) throwSystemError(errno, "lock", path);
+      if (deadline.hasPassed())
+        throw std::runtime_error(
+            fmt::format("{} is locked by another process, which may be stopped", path));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
   }
   ~FileLock() { ::flock(fd_, LOCK_UN); }
   FileLock(const FileLock&) = delete;
@@ -198,9 +211,10 @@ ModelWireWatcher::ModelWireWatcher(ModelWires& wires, std::function<void()> chan
       std::jthread([this, seen, changed = std::move(changed)](const std::stop_token& stop) mutable {
         for (;;) {
           file_.waitForMore(seen);
-          if (stop.stop_requested()) return;
-          // PAIR(wire-changed): the values of the changes up to this number are visible.
+          // PAIR(wire-changed): the values of the changes up to this number are visible, and the
+          // request to stop that the destructor has announced.
           const auto now = file_.changes.load(std::memory_order_acquire);
+          if (stop.stop_requested()) return;
           if (std::exchange(seen, now) != now) changed();
         }
       });

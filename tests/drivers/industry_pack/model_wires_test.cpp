@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/drivers/industry_pack/model_wires.h>
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,6 +14,8 @@
 #include <stdexcept>
 #include <thread>
 #include <vector>
+
+#include <mpf/file_descriptor.h>
 
 #include "tests/support/temporary_folder.h"
 #include "tests/support/watchdog.h"
@@ -40,6 +44,14 @@ class ModelWiresTest : public testing::Test {
   TemporaryFolder folder_;
   std::string path_ = folder_.file("wires");
 };
+
+TEST_F(ModelWiresTest, AFileThatAStoppedProcessHasLockedIsRefused) {
+  const ModelWires wires(path_);
+  const FileDescriptor stopped(::open(path_.c_str(), O_RDWR | O_CLOEXEC));
+  ASSERT_EQ(::flock(stopped.get(), LOCK_EX), 0);
+
+  expectRefused("locked by another process");
+}
 
 TEST_F(ModelWiresTest, CarryValuesBetweenObjectsByName) {
   ModelWires one(path_);
