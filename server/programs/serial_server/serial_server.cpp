@@ -249,6 +249,7 @@ void SerialServer::ask(Work& work) {
   while (isInStep(work, true, until)) {
     reader_.prepareQuestion(maxBytesOf(work.fields), work.retries > 0);
     if (takeAnswer(work, port_->writeRead(work.data, deadlineOf(work)))) return;
+    if (work.isAbandoned()) return;
   }
 }
 
