@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "epics/common_fields.h"
+#include "epics/every_output.h"
 #include "epics/fate_text.h"
 #include "epics/ioc_clients.h"
 #include "epics/link_address.h"
@@ -158,6 +159,7 @@ class DevMpf::Impl final : public SharedClient::Member,
   void onConnect(const Connect& connect) {
     if (record_->pact) return;  // its request ends with an alarm of its own
     if (connect.status == ConnectStatus::connectYes) {
+      const EveryOutput every(record_, EveryOutput::Pass::write);
       if (hasProcessed_ || processesAtStart(record_)) dbProcess(record_);
       return;
     }
@@ -220,6 +222,7 @@ class DevMpf::Impl final : public SharedClient::Member,
       deadlineNs_.store(0, std::memory_order_relaxed);
     }
     reply_ = std::move(message);
+    const EveryOutput every(record_, EveryOutput::Pass::completion);
     if (!record_->pact) dbProcess(record_);
     else if (isFirst) record_->rset->process(record_);
     reply_.reset();  // a disabled record does not use it

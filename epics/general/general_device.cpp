@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "epics/common_fields.h"
+#include "epics/every_output.h"
 #include "epics/fate_text.h"
 #include "epics/link_address.h"
 
@@ -191,6 +192,7 @@ void GeneralDevice::connectOutput(dbCommon* record) {
   if (options_.readback && !hasReadBack_ && !hasWritten_) {
     static_cast<void>(query(*options_.readback));
   } else if (hasWritten_ ? options_.rewrite : isFirst && processesAtStart(record)) {
+    const EveryOutput every(record, EveryOutput::Pass::write);
     if (!record->pact) dbProcess(record);
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Output records with DTYP "MPF" and their connections: the first value, readback=, rewrite=.
 #include <gmock/gmock.h>
+#include <longoutRecord.h>
 #include <optional>
 #include <string>
 
@@ -216,6 +217,98 @@ TEST_F(GeneralOutputTest, AnOutputWritesAgainAfterAReconnectionOnlyWhenTheLinkSa
       EXPECT_EQ(Ioc::get("v.STAT"), "COMM");
     }
   }
+}
+
+// ---- longout with OOPT: a field of EPICS Base 7.0.8 and later
+
+template <class Record>
+constexpr bool kHasOption = requires(Record record) { record.oopt; };
+
+class OutputOnChange : public GeneralOutputTest {
+ protected:
+  void SetUp() override {
+    if (!kHasOption<longoutRecord>) GTEST_SKIP() << "this EPICS Base has no OOPT";
+  }
+  static std::string onChange(const std::string& link, const std::string& fields = "") {
+    return longout(link, "field(OOPT, \"On Change\") " + fields) +
+           "record(longin, \"other\") { field(DTYP, \"MPF\") "
+           "field(INP, \"@s cmd=7\") field(PINI, \"YES\") }\n";
+  }
+  static constexpr const char* kFirst = "field(VAL, \"5\") field(PINI, \"YES\")";
+};
+
+TEST_F(OutputOnChange, GetsTheStatusOfItsWrite) {
+  const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
+    auto* fields = request.tryAs<Int32>();
+    fields->status = fields->cmd == kReadBack ? 0 : -3;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(onChange("@s"));
+  Ioc::waitFor("other.SEVR", "NO_ALARM");
+
+  ASSERT_EQ(Ioc::put("v", "5"), 0);
+
+  Ioc::waitFor("v.AMSG", "status -3 from the server");
+  EXPECT_EQ(Ioc::get("v.STAT"), "WRITE");
+  EXPECT_EQ(Ioc::get("v.OOPT"), "On Change");
+}
+
+TEST_F(OutputOnChange, IsWrittenAtTheFirstConnectionWhenPiniAsksForIt) {
+  const Ioc ioc(onChange("@s", kFirst));
+  Ioc::waitFor("v.STAT", "COMM");
+
+  const Register server(backplane_);
+
+  while (server.value() != 5) std::this_thread::yield();
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+}
+
+TEST_F(OutputOnChange, WritesAgainAfterAReconnection) {
+  std::optional<Register> server(std::in_place, backplane_);
+  const Ioc ioc(onChange("@s rewrite=yes", kFirst));
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+
+  server.reset();
+  Ioc::waitFor("v.STAT", "COMM");
+  server.emplace(backplane_);
+
+  while (server->value() != 5) std::this_thread::yield();
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+}
+
+TEST_F(OutputOnChange, DoesNotWriteTheSameValueAgain) {
+  const Register server(backplane_);
+  const Ioc ioc(onChange("@s"));
+  Ioc::waitFor("other.SEVR", "NO_ALARM");
+
+  for (const char* value : {"5", "5", "6"}) {
+    ASSERT_EQ(Ioc::put("v", value), 0);
+    Ioc::waitFor("v.PACT", "0");
+  }
+
+  EXPECT_EQ(server.value(), 6);
+  EXPECT_EQ(server.writes(), 2);
+}
+
+// The record processes again after the reply, with a value that was not sent before.
+TEST_F(OutputOnChange, WritesAValueThatWasPutBeforeTheReply) {
+  std::atomic<bool> isBusy = true;
+  std::atomic<int> last = 0;
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    const auto* fields = request.tryAs<Int32>();
+    while (fields->cmd != kReadBack && isBusy) std::this_thread::yield();
+    last = fields->value;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(onChange("@s"));
+  Ioc::waitFor("other.SEVR", "NO_ALARM");
+  ASSERT_EQ(Ioc::put("v", "5"), 0);
+  ASSERT_EQ(Ioc::put("v", "6"), 0);
+  EXPECT_EQ(Ioc::get("v.PACT"), "1");
+
+  isBusy = false;
+
+  while (last != 6) std::this_thread::yield();
 }
 
 }  // namespace
