@@ -2,11 +2,16 @@
 #include "epics/commands/child_program.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
+#include <sys/eventfd.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <dlfcn.h>
 #include <filesystem>
 
@@ -46,10 +51,15 @@ std::string programPath(const std::string& name) {
   ::_exit(kNotFound);
 }
 
+// For poll(): rounded up.
+int millisecondsOf(Nanoseconds wait) noexcept {
+  return static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(wait).count());
+}
+
 }  // namespace
 
-ChildProgram::ChildProgram(const std::string& name, std::vector<std::string> arguments,
-                           int output) {
+ChildProgram::ChildProgram(const std::string& name, std::vector<std::string> arguments, int output)
+    : terminating_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", name)) {
   arguments.insert(arguments.begin(), programPath(name));
   std::vector<char*> pointers;
   for (auto& argument : arguments) pointers.push_back(argument.data());
@@ -58,6 +68,7 @@ ChildProgram::ChildProgram(const std::string& name, std::vector<std::string> arg
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): after what it needs
   pid_ = checkCall(::fork(), "start", name);
   if (pid_ == 0) run(parent, pointers.data(), output);
+  process_.reset(static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)));
 }
 
 ChildProgram::~ChildProgram() {
@@ -66,23 +77,55 @@ ChildProgram::~ChildProgram() {
 }
 
 int ChildProgram::wait() {
-  // The process stays a zombie until the lock is held: terminate() never signals another process.
-  siginfo_t ended{};
-  retryInterrupted(
-      [&] { return ::waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOWAIT); });
-  const std::lock_guard lock(mutex_);
+  constexpr std::chrono::seconds kAfterKill{1};  // the kernel may be busy with a device
   if (pid_ == 0) return status_;
-  int status = 0;
-  retryInterrupted([&] { return ::waitpid(pid_, &status, 0); });
-  pid_ = 0;
-  constexpr int kSignalled = 128;
-  status_ = WIFEXITED(status) ? WEXITSTATUS(status) : kSignalled + WTERMSIG(status);
-  return status_;
+  if (!waitForEnd(Deadline::never(), terminating_.get()) &&
+      !waitForEnd(Deadline::after(kLongestEnd))) {
+    sendSignal(SIGKILL);
+    waitForEnd(Deadline::after(kAfterKill));
+  }
+  return reap();
 }
 
 void ChildProgram::terminate() {
+  sendSignal(SIGTERM);
+  ::eventfd_write(terminating_.get(), 1);
+}
+
+void ChildProgram::sendSignal(int signal) {
   const std::lock_guard lock(mutex_);
-  if (pid_ != 0) ::kill(pid_, SIGTERM);
+  if (pid_ != 0) ::kill(pid_, signal);
+}
+
+bool ChildProgram::hasEnded() const noexcept {
+  siginfo_t ended{};
+  const auto id = static_cast<id_t>(pid_);
+  // An error: the process ignores SIGCHLD, so the kernel has reaped the program.
+  return ::waitid(P_PID, id, &ended, WEXITED | WNOWAIT | WNOHANG) < 0 || ended.si_pid != 0;
+}
+
+bool ChildProgram::waitForEnd(Deadline deadline, int other) const noexcept {
+  constexpr Nanoseconds kLook = std::chrono::milliseconds(50);  // without a descriptor
+  std::array<pollfd, 2> events{pollfd{.fd = process_.get(), .events = POLLIN, .revents = 0},
+                               pollfd{.fd = other, .events = POLLIN, .revents = 0}};
+  while (!hasEnded() && !deadline.hasPassed() && events[1].revents == 0) {
+    const auto longest = process_ ? deadline.left() : std::min(kLook, deadline.left());
+    const bool isUnlimited = process_ && deadline.isNever();
+    ::poll(events.data(), events.size(), isUnlimited ? -1 : millisecondsOf(longest));
+  }
+  return hasEnded();
+}
+
+int ChildProgram::reap() {
+  constexpr int kSignalled = 128;
+  const std::lock_guard lock(mutex_);  // terminate() never signals another process
+  int status = 0;
+  const auto reaped = retryInterrupted([&] { return ::waitpid(pid_, &status, WNOHANG); });
+  const bool hasExited = reaped != 0 && WIFEXITED(status);
+  const int signal = reaped != 0 ? WTERMSIG(status) : SIGKILL;
+  status_ = hasExited ? WEXITSTATUS(status) : kSignalled + signal;
+  pid_ = 0;
+  return status_;
 }
 
 }  // namespace mpf

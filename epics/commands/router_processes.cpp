@@ -39,6 +39,7 @@ void RouterProcesses::end() {
     const std::lock_guard lock(mutex_);
     threads.swap(threads_);
   }
+  for (auto& [location, thread] : threads) thread.request_stop();  // the routers end together
 }
 
 void RouterProcesses::run(const std::stop_token& stop, const std::vector<std::string>& arguments) {

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <gtest/gtest.h>
+#include <thread>
 
 #include <mpf/file_descriptor.h>
 
@@ -59,6 +60,31 @@ TEST(ChildProgramTest, EndsWithTheObject) {
 
   char byte = 0;
   EXPECT_EQ(::read(output.get(), &byte, 1), 0) << "the program has closed its output";
+}
+
+// The program ignores SIGTERM; one that is stopped does not receive it.
+TEST(ChildProgramTest, EndsWithTheObjectAlsoIfItIgnoresTheRequestToEnd) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(::pipe2(ends.data(), O_CLOEXEC), 0);
+  const FileDescriptor output(ends[0]);
+  FileDescriptor toOutput(ends[1]);
+  char byte = 0;
+  {
+    const ChildProgram program("sh", {"-c", "trap '' TERM; printf x; exec sleep 1000"},
+                               toOutput.get());
+    ASSERT_EQ(::read(output.get(), &byte, 1), 1);
+  }
+  toOutput.reset();
+
+  EXPECT_EQ(::read(output.get(), &byte, 1), 0) << "the program has closed its output";
+}
+
+// wait() has begun before terminate().
+TEST(ChildProgramTest, AWaitEndsWhenTheProgramIgnoresTheRequestToEnd) {
+  ChildProgram program("sh", {"-c", "kill -STOP $$"});
+  const std::jthread terminating([&] { program.terminate(); });
+
+  EXPECT_GT(program.wait(), 128);
 }
 
 }  // namespace
