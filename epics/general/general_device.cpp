@@ -88,7 +88,7 @@ long GeneralDevice::startIO(dbCommon* record) {
   }
   if (pending_) return take(record, *std::exchange(pending_, std::nullopt));
   if (subscription_ == Subscription::none) subscribe();
-  return subscription_ == Subscription::none ? -1 : repeatResult(record);
+  return subscription_ == Subscription::none ? -1 : keepValue(record);
 }
 
 long GeneralDevice::write(dbCommon* record) {
@@ -168,6 +168,11 @@ long GeneralDevice::repeatResult(dbCommon* record) {
   if (*stored_ == Stored::truncated)
     recGblSetSevrMsg(record, READ_ALARM, MINOR_ALARM, "the value is longer than the record");
   return *stored_ == Stored::converted && !access_.isOutput() ? MPF_NoConvert : MPF_OK;
+}
+
+long GeneralDevice::keepValue(dbCommon* record) {
+  const auto status = repeatResult(record);
+  return status == MPF_OK && access_.isSmoothed(record) ? MPF_NoConvert : status;
 }
 
 long GeneralDevice::failStatus(dbCommon* record, std::int32_t status) {

@@ -47,6 +47,8 @@ struct RecordAccess {
                                       std::vector<double>& scratch);
   // OMSL of an output record.
   epicsEnum16* (*outputMode)(dbCommon*);
+  // Whether SMOO would change VAL each time that the record converts RVAL.
+  bool (*isSmoothed)(const dbCommon*);
 
   [[nodiscard]] bool isOutput() const noexcept { return load != nullptr; }
 };
@@ -77,6 +79,8 @@ class GeneralDevice final : public DevMpf {
   // Stores the value of a message in the record, or sets an alarm.
   long take(dbCommon* record, const Message& message);
   long repeatResult(dbCommon* record);
+  // The result when the record processes without a message: it keeps its value.
+  long keepValue(dbCommon* record);
   void takeReadback(dbCommon* record, const Message& message);
   // Processes the record with the value that was read back; endReadback() stands for the write.
   void showReadback(dbCommon* record);

@@ -39,6 +39,13 @@ constexpr bool kCanHaveBits =
     requires(Record record) { record.rval; } || std::is_integral_v<decltype(Record::val)>;
 
 template <class Record>
+bool isSmoothed(const dbCommon* common) {
+  if constexpr (requires(Record record) { record.smoo; })
+    return reinterpret_cast<const Record*>(common)->smoo != 0;
+  else return false;
+}
+
+template <class Record>
 constexpr RecordAccess accessOf() {
   RecordAccess access{
       .type = typeOf<Record>,
@@ -52,7 +59,8 @@ constexpr RecordAccess accessOf() {
             return fields::store(*reinterpret_cast<Record*>(record), value, options);
           },
       .load = nullptr,
-      .outputMode = nullptr};
+      .outputMode = nullptr,
+      .isSmoothed = isSmoothed<Record>};
   if constexpr (kIsOutput<Record>) {
     access.load = [](const dbCommon* record, const LinkOptions& options,
                      std::vector<double>& scratch) -> std::optional<MessageValue> {

@@ -192,6 +192,20 @@ TEST_F(GeneralDeviceTest, ASubscribedRecordThatProcessesSendsNothingAndKeepsItsV
   EXPECT_EQ(server.requests(), 1);
 }
 
+// With SMOO, Base would approach RVAL each time that the record processes.
+TEST_F(GeneralDeviceTest, ASubscribedRecordThatProcessesKeepsItsSmoothedValue) {
+  const Publisher server(backplane_, 10);
+  const Ioc ioc(R"(record(ai, "v") { field(DTYP, "MPF") field(INP, "@s type=int32 mode=subscribe")
+    field(SMOO, "0.5") field(PREC, "6") })");
+  Ioc::waitFor("v.RVAL", "11");
+  const auto smoothed = Ioc::get("v");
+
+  ASSERT_EQ(Ioc::put("v.PROC", "1"), 0);
+
+  EXPECT_EQ(Ioc::get("v"), smoothed);
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+}
+
 TEST_F(GeneralDeviceTest, ARefusedSubscriptionIsAReadAlarmAndRepeatedWhenTheRecordProcesses) {
   std::atomic<bool> isRefusing = true;
   const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
