@@ -189,7 +189,7 @@ std::optional<double> toDouble(const MessageValue& value) {
   if (const auto* text = std::get_if<std::string_view>(&value)) return numberAtStart(*text);
   std::optional<double> number;
   forElements(value, 1, [&](auto element) {
-    number = static_cast<double>(element);
+    number = fit<double>(element);
     return false;
   });
   return number;
@@ -244,16 +244,22 @@ Stored storeElements(const MessageValue& value, int elementType, void* array, st
   });
 }
 
-MessageValue loadElements(int elementType, const void* array, std::uint32_t used,
-                          std::vector<double>& scratch) {
-  return withElementType(elementType, [&]<class T>(T*) -> MessageValue {
+std::optional<MessageValue> loadElements(int elementType, const void* array, std::uint32_t used,
+                                         std::vector<double>& scratch) {
+  return withElementType(elementType, [&]<class T>(T*) -> std::optional<MessageValue> {
     const auto* elements = static_cast<const T*>(array);
     if constexpr (sizeof(T) == 1) {
       return std::string_view(static_cast<const char*>(array), used);
     } else if constexpr (std::is_same_v<T, epicsInt32> || std::is_same_v<T, double>) {
       return std::span<const T>(elements, used);
     } else {
-      scratch.assign(elements, elements + used);
+      scratch.clear();
+      scratch.reserve(used);
+      for (const T element : std::span(elements, used)) {
+        const auto number = fit<double>(element);
+        if (!number) return std::nullopt;
+        scratch.push_back(*number);
+      }
       return std::span<const double>(scratch);
     }
   });

@@ -5,7 +5,8 @@
 //   field ── loadElements() ─► MessageValue ── makeMessage() ──► request
 //
 // A conversion that would change the value does not happen: NaN and infinities are no integers, and
-// numbers outside the range of the target do not fit. Fractions are rounded to the nearest integer.
+// numbers outside the range of the target do not fit, nor integers that no double can hold exactly.
+// Fractions are rounded to the nearest integer, and doubles to the nearest float.
 // Text converts to the number that it begins with; numbers convert to text. The first element of an
 // array stands for it where one value is needed.
 //
@@ -55,6 +56,8 @@ struct Reading {
 template <class To, class From>
 [[nodiscard]] std::optional<To> fit(From number) noexcept {
   if constexpr (std::is_floating_point_v<To>) {
+    if constexpr (std::is_integral_v<From>)
+      if (fit<From>(static_cast<double>(number)) != number) return std::nullopt;
     const auto result = static_cast<To>(number);
     if (std::isinf(result) && !std::isinf(static_cast<double>(number))) return std::nullopt;
     return result;
@@ -102,8 +105,10 @@ enum class Stored {
 [[nodiscard]] Stored storeElements(const MessageValue& value, int elementType, void* array,
                                    std::uint32_t room, std::uint32_t& used);
 //   scratch   holds the elements that have no type in messages
-[[nodiscard]] MessageValue loadElements(int elementType, const void* array, std::uint32_t used,
-                                        std::vector<double>& scratch);
+//   returns   nullopt when an element does not fit a double
+[[nodiscard]] std::optional<MessageValue> loadElements(int elementType, const void* array,
+                                                       std::uint32_t used,
+                                                       std::vector<double>& scratch);
 // The type of message that holds arrays of these elements; none for strings.
 [[nodiscard]] MessageType messageTypeOf(int elementType) noexcept;
 

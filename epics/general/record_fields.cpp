@@ -339,7 +339,7 @@ Stored store(aaiRecord& record, const Value& value, const Options& /*options*/) 
 Stored store(aaoRecord& record, const Value& value, const Options& /*options*/) {
   return storeArray(record, value);
 }
-Value load(const aaoRecord& record, const Options& /*options*/, Scratch& scratch) {
+std::optional<Value> load(const aaoRecord& record, const Options& /*options*/, Scratch& scratch) {
   return loadElements(record.ftvl, record.bptr, record.nord, scratch);
 }
 

@@ -87,7 +87,7 @@ Value load(const lsoRecord& record, const Options& options, Scratch& scratch);
 Stored store(waveformRecord& record, const Value& value, const Options& options);
 Stored store(aaiRecord& record, const Value& value, const Options& options);
 Stored store(aaoRecord& record, const Value& value, const Options& options);
-Value load(const aaoRecord& record, const Options& options, Scratch& scratch);
+std::optional<Value> load(const aaoRecord& record, const Options& options, Scratch& scratch);
 
 // Record types without such fields.
 template <class Record>

@@ -127,6 +127,34 @@ TEST_F(GeneralDeviceTest, AValueThatDoesNotFitTheMessageIsNotWritten) {
   EXPECT_EQ(requests, 1);
 }
 
+// Doubles above 2^53 are even.
+TEST_F(GeneralDeviceTest, AnIntegerThatADoubleCannotHoldIsNotWritten) {
+  std::atomic<int> requests = 0;
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    ++requests;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(R"(
+    record(int64out, "v") { field(DTYP, "MPF") field(OUT, "@s type=float64")
+      field(VAL, "9007199254740993") field(PINI, "YES") }
+    record(aao, "a") { field(DTYP, "MPF") field(OUT, "@s") field(FTVL, "INT64") field(NELM, "2") }
+    record(aao, "u") { field(DTYP, "MPF") field(OUT, "@s") field(FTVL, "UINT64") field(NELM, "2") }
+  )");
+  Ioc::waitFor("v.AMSG", "the value does not fit the message");
+  for (const std::string name : {"v", "a", "u"}) {
+    static_cast<void>(Ioc::put(name, "9007199254740993"));
+    EXPECT_EQ(Ioc::get(name + ".STAT"), "WRITE") << name;
+    EXPECT_EQ(Ioc::get(name + ".AMSG"), "the value does not fit the message") << name;
+  }
+  EXPECT_EQ(requests, 0);
+
+  for (const std::string name : {"v", "a", "u"}) {
+    ASSERT_EQ(Ioc::put(name, "9007199254740994"), 0);
+    Ioc::waitFor(name + ".SEVR", "NO_ALARM");
+  }
+  EXPECT_EQ(requests, 3);
+}
+
 TEST_F(GeneralDeviceTest, ARefusedWriteIsAWriteAlarm) {
   const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
     request.tryAs<Int32>()->status = -1;

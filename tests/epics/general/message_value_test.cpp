@@ -31,6 +31,22 @@ TEST(MessageValue, RoundsAndRefusesWhatDoesNotFit) {
     EXPECT_EQ(fit<std::int32_t>(number), std::nullopt);
 }
 
+TEST(MessageValue, AnIntegerThatADoubleCannotHoldDoesNotFit) {
+  constexpr std::int64_t kOdd = (std::int64_t{1} << 53) + 1;
+  EXPECT_EQ(fit<double>(kOdd), std::nullopt);
+  EXPECT_EQ(fit<double>(kOdd + 1), 0x1p53 + 2);
+  EXPECT_EQ(fit<double>(INT64_MAX), std::nullopt);
+  EXPECT_EQ(fit<double>(INT64_MIN), -0x1p63);
+  EXPECT_EQ(fit<double>(UINT64_MAX), std::nullopt);
+  EXPECT_EQ(fit<float>(16'777'217), 0x1p24F) << "a float is rounded";
+  EXPECT_EQ(toDouble(kOdd), std::nullopt);
+
+  std::vector<double> scratch;
+  const std::array<std::int64_t, 2> elements{1, kOdd};
+  EXPECT_TRUE(loadElements(menuFtypeINT64, elements.data(), 1, scratch));
+  EXPECT_FALSE(loadElements(menuFtypeINT64, elements.data(), 2, scratch));
+}
+
 TEST(MessageValue, ConvertsTextToTheNumberAtItsStart) {
   EXPECT_EQ(toDouble(text(" +2.5e1 V\r\n")), 25);
   EXPECT_EQ(toInteger(text("-7")), -7);
@@ -147,8 +163,8 @@ TEST(MessageValue, LoadsElementsOfEachWidth) {
   const std::array<epicsUInt16, 2> shorts{1, 65535};
 
   const auto value = loadElements(menuFtypeUSHORT, shorts.data(), 2, scratch);
-  EXPECT_THAT(std::get<std::span<const double>>(value), ElementsAre(1, 65535));
-  EXPECT_EQ(std::get<std::string_view>(loadElements(menuFtypeUCHAR, "ab", 2, scratch)), "ab");
+  EXPECT_THAT(std::get<std::span<const double>>(value.value()), ElementsAre(1, 65535));
+  EXPECT_EQ(std::get<std::string_view>(*loadElements(menuFtypeUCHAR, "ab", 2, scratch)), "ab");
   EXPECT_EQ(messageTypeOf(menuFtypeUSHORT), MessageType::int32Array);
   EXPECT_EQ(messageTypeOf(menuFtypeULONG), MessageType::float64Array);
   EXPECT_EQ(messageTypeOf(menuFtypeSTRING), MessageType::none);
