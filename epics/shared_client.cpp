@@ -55,6 +55,8 @@ SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& m
     if (result == SendResult::sent) storeId(requestId, id);
     if (!isFull(result)) return result;
   }
+  const auto mostBytes = client_->maxMessageBytes();  // 0: has been disconnected meanwhile
+  if (mostBytes != 0 && message.body().size() > mostBytes) return SendResult::tooLarge;
   if (backlog_.size() >= kMaxBacklog) return SendResult::queueFull;
   // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
   backlog_.push_back({std::move(message), deadline, &requestId});
@@ -107,7 +109,8 @@ bool SharedClient::trySendFirst(std::vector<Message>& fates) {
     storeId(*waiting.requestId, id);
   } else {
     waiting.message.setClientType(clientType);
-    fates.push_back(fateOf(waiting.message, Fate::neverTaken));
+    const bool isConnected = result != SendResult::notConnected;
+    fates.push_back(fateOf(waiting.message, isConnected ? Fate::refused : Fate::neverTaken));
   }
   return true;
 }

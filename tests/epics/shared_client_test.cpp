@@ -142,6 +142,23 @@ TEST_F(SharedClientTest, RequestsThatWaitTooLongExpire) {
   }
 }
 
+// It would be refused only after those before it.
+TEST_F(SharedClientTest, ARequestThatIsTooLargeDoesNotWaitForTheQueue) {
+  MessageServer server(backplane_, "s", {.queueSize = 1, .maxMessageBytes = 65'536});
+  const auto one = client_.add(one_);
+  client_.bind();
+  while (!client_.isConnected()) {
+    server.waitForMessage(Deadline::after(std::chrono::milliseconds(1)));
+    ASSERT_FALSE(server.receive());
+  }
+  constexpr int kRequests = 5;
+  for (int value = 0; value < kRequests; ++value) EXPECT_EQ(send(one, value), SendResult::sent);
+
+  EXPECT_EQ(client_.send(one, replyTypeCompleteIO, Char8ArrayMessage::allocValue(100'000),
+                         Deadline::never(), requestId_),
+            SendResult::tooLarge);
+}
+
 TEST_F(SharedClientTest, ARequestExpiresBehindOneWithoutATimeLimit) {
   MessageServer server(backplane_, "s", {.queueSize = 1});
   const auto one = client_.add(one_);
