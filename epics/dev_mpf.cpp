@@ -136,11 +136,15 @@ class DevMpf::Impl final : public SharedClient::Member,
       if (const auto* fate = reply.tryAs<RequestFate>()) return failFate(fate->fate);
       return device_.completeIO(record_, std::move(reply));
     }
+    isDelayOver_ = record_->pact;
     const auto status = start();
+    isDelayOver_ = false;
     if (record_->nsev == INVALID_ALARM && !hasMessageTime_) stampNow();
     return status;
   }
   long send(Message&& message, ReplyType reply) {
+    if (reply == replyTypeCompleteIO && isDelayOver_)
+      return device_.fail(record_, "SIMM was changed during SDLY");
     const auto deadline = timeout_.count() == 0 ? Deadline::never() : Deadline::after(timeout_);
     auto& requestId = reply == replyTypeCompleteIO ? requestId_ : otherRequestId_;
     requestId.store(0, std::memory_order_relaxed);
@@ -252,8 +256,10 @@ class DevMpf::Impl final : public SharedClient::Member,
 
   friend class DevMpf;
   std::uint32_t member_ = 0;
-  bool isRequestOutstanding_ = false;  // these four with the record locked
+  bool isRequestOutstanding_ = false;  // these five with the record locked
   bool hasProcessed_ = false;
+  // The record was simulated when it became active: Base completes it now, and waits for no reply.
+  bool isDelayOver_ = false;
   bool hasMessageTime_ = false;  // TSE -2: the record processes with the time of a message
   std::optional<Message> reply_;  // the message that the record processes now
   RecordQueue queue_;

@@ -4,6 +4,7 @@
 #include <epicsTime.h>
 #include <limits>
 #include <optional>
+#include <recSup.h>
 
 #include "tests/epics/epics_fixture.h"
 
@@ -240,6 +241,41 @@ TEST_F(DevMpfTest, AServerThatSendsWithoutEndCostsOverrunsOnly) {
   ASSERT_EQ(Ioc::put("other.PROC", "1"), 0);
   EXPECT_EQ(Ioc::get("other"), "3");
   isOver = true;
+}
+
+// The end of the delay SDLY, for which the record waits.
+void endSimulationDelay(const char* name) {
+  DBADDR address;
+  ASSERT_EQ(dbNameToAddr(name, &address), 0);
+  dbScanLock(address.precord);
+  static_cast<void>(address.precord->rset->process(address.precord));
+  dbScanUnlock(address.precord);
+}
+
+// Then EPICS Base lets device support begin, and completes the record without a reply.
+TEST_F(DevMpfTest, ARecordWhoseSimulationIsSwitchedOffDuringItsDelaySendsNothing) {
+  std::atomic<int> requests = 0;
+  const ThreadServer server(backplane_, "adc", [&](MessageServer& self, Message&& request) {
+    ++requests;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(
+      "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@adc value=7\")"
+      " field(PINI, \"YES\") field(SDLY, \"3600\") }");
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+  ASSERT_EQ(Ioc::put("v.SIMM", "YES"), 0);
+  ASSERT_EQ(Ioc::put("v.PROC", "1"), 0);
+  ASSERT_EQ(Ioc::get("v.PACT"), "1");
+  ASSERT_EQ(Ioc::put("v.SIMM", "NO"), 0);
+
+  endSimulationDelay("v");
+
+  EXPECT_EQ(Ioc::get("v.PACT"), "0");
+  EXPECT_EQ(Ioc::get("v.STAT"), "READ");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "SIMM was changed during SDLY");
+  ASSERT_EQ(Ioc::put("v.PROC", "1"), 0);
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+  EXPECT_EQ(requests, 2);
 }
 
 }  // namespace
