@@ -29,6 +29,7 @@ int serve(int argc, char** argv) {
   mpf::SerialPorts ports(options, log);
   const auto backplane = mpf::Backplane::attach(options.arguments.backplane);
   mpf::StopBell stop;
+  mpf::ProgramFailure failure;  // destroyed after the servers, whose threads use it
   std::vector<std::unique_ptr<mpf::ServedPort>> served;
   served.reserve(options.servers.size());
   for (const auto& start : options.servers)
@@ -40,7 +41,6 @@ int serve(int argc, char** argv) {
       if (port != nullptr && port->module == module) server->countAlarm();
     }
   });
-  mpf::ProgramFailure failure;
   for (const auto& server : served) server->start([&] { failure.report(); });
   stop.wait();
   for (const auto& server : served) server->stop();

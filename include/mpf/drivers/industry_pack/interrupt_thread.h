@@ -103,7 +103,7 @@ class InterruptThread {
   FileDescriptor wakeUp_;
   // spurious interrupts less compensation; this and below: used by the thread only
   int spuriousExcess_ = 0;
-  int lateInRow_ = 0;  // polls in a row that found a request
+  int lateInRow_ = 0;  // polls in a row that found a request, at most lateLimit
   bool isPolled_;
   Deadline pausedUntil_ = Deadline::never();
   Deadline stormEnds_ = Deadline::never();  // set while the line is enabled in a storm
