@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <filesystem>
+#include <fmt/format.h>
 
 #include "tests/tools/one_link.h"
 
@@ -92,8 +93,9 @@ TEST_F(DissectLinkTest, HasTheRepliesOfBothRingsInOneRow) {
   const auto& replies = link.at("replies").at("messages");
   ASSERT_EQ(replies.size(), static_cast<std::size_t>(kReplies));
   for (int value = 0; value < kReplies; ++value) {
-    EXPECT_EQ(replies.at(value).at("state"), "waiting");
-    EXPECT_EQ(replies.at(value).at("message").at("value"), value + 1);
+    const auto& reply = replies.at(static_cast<std::size_t>(value));
+    EXPECT_EQ(reply.at("state"), "waiting");
+    EXPECT_EQ(reply.at("message").at("value"), value + 1);
   }
   takeReplies(kReplies);
   EXPECT_EQ(dissect().at("replies").at("waiting"), 0);
