@@ -12,6 +12,8 @@ using router::FarClients;
 
 class FarClientsTest : public RouterPartsTest {
  protected:
+  ~FarClientsTest() noexcept override = default;
+
   void SetUp() override {
     limits_.maxClients = 3;
     startGreeted();
@@ -61,7 +63,7 @@ TEST_F(FarClientsTest, AClientThatWasNeverOpenedIsAProtocolError) {
 }
 
 TEST_F(FarClientsTest, TheLimitCountsClientsThatExist) {
-  for (const std::uint32_t number : {1, 2, 3}) add(number, 1);
+  for (const std::uint32_t number : {1u, 2u, 3u}) add(number, 1);
 
   EXPECT_EQ(refusalOf(4), FarewellCode::LIMIT);
   clients_->remove(2);

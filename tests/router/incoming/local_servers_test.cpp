@@ -19,6 +19,8 @@ using testing::StartsWith;
 
 class LocalServersTest : public RouterPartsTest {
  protected:
+  ~LocalServersTest() noexcept override = default;
+
   void SetUp() override {
     context_.config.serve = {{.location = 1, .local = 0}};
     onPlain_ = [this](router::PlainItem& item) { servers_->handle(item); };

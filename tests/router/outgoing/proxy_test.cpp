@@ -17,6 +17,8 @@ using testing::StartsWith;
 
 class ProxyTest : public RouterPartsTest {
  protected:
+  ~ProxyTest() noexcept override = default;
+
   static constexpr std::uint32_t kWindowBytes = 1 << 20;
 
   void SetUp() override {
@@ -96,10 +98,11 @@ TEST_F(ProxyTest, RequestsThatWaitTogetherAreAnsweredTogether) {
   }
   std::vector<Fill> replies;
   for (std::int32_t i = 0; i < kRequests; ++i) {
+    const auto id = ids[static_cast<std::size_t>(i)];
     EXPECT_THAT(nextItem(),
-                AllOf(StartsWith("(request = (client = 1, requestId = " + std::to_string(ids[i])),
+                AllOf(StartsWith("(request = (client = 1, requestId = " + std::to_string(id)),
                       HasSubstr("clientType = " + std::to_string(i + 100))));
-    replies.push_back(test::reply(1, ids[i], true, i));
+    replies.push_back(test::reply(1, id, true, i));
   }
 
   send(frameOf(replies));

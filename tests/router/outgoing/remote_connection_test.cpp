@@ -14,6 +14,8 @@ using testing::HasSubstr;
 
 class RemoteConnectionTest : public RouterPartsTest {
  protected:
+  ~RemoteConnectionTest() noexcept override = default;
+
   void connect(std::uint32_t maxClients) {
     startGreeted(greeting([=](auto greeting) { greeting.setMaxClients(maxClients); }));
     connection_.emplace(*line_, record_, context_.log, "far:9900", [this] { ++removed_; });

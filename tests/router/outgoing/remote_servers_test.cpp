@@ -18,6 +18,8 @@ using testing::StartsWith;
 
 class RemoteServersTest : public RouterPartsTest {
  protected:
+  ~RemoteServersTest() noexcept override = default;
+
   void SetUp() override {
     onPlain_ = [this](router::PlainItem& item) { servers_->handle(item); };
     startGreeted();
