@@ -58,7 +58,7 @@ class IocClients {
   void add(std::unique_ptr<DevMpf> owner, Device& device);
   // The queue of records with this PRIO. Its callback is requested soon, but not before the IOC
   // runs: that would process records too early.
-  [[nodiscard]] CallbackQueue& callbacks(int priority) { return callbacks_.at(priority); }
+  [[nodiscard]] CallbackQueue& callbacks(std::size_t priority) { return callbacks_.at(priority); }
   void print(int level) const;
   // Called by the IOC with an initHookState.
   void onHook(int state);
