@@ -43,7 +43,7 @@ TEST_F(RelayTest, RequestsOfARunHaveTheirIds) {
 
   EXPECT_EQ(client_.sendAs(int32Run({5, 78, 9})), 3u);
 
-  for (const std::uint32_t id : {5, 78, 9}) {
+  for (const std::uint32_t id : {5u, 78u, 9u}) {
     auto request = take();
     EXPECT_EQ(request.route().requestId, id);
     EXPECT_EQ(request.tryAs<Int32>()->value, static_cast<std::int32_t>(id));
@@ -61,7 +61,7 @@ TEST_F(RelayTest, ARunEndsAtARequestThatCannotBeSent) {
   EXPECT_EQ(client_.sendAs(int32Run({5, 6, 5, 7})), 2u) << "the place of 5 is in use";
   EXPECT_EQ(client_.sendAs(int32Run({7, 8, 9, 10})), 2u) << "the queue has 4 places";
 
-  for (const std::uint32_t id : {5, 6, 7, 8}) {
+  for (const std::uint32_t id : {5u, 6u, 7u, 8u}) {
     auto request = take();
     EXPECT_EQ(request.route().requestId, id);
     static_cast<void>(server_->reply(std::move(request)));
@@ -71,7 +71,7 @@ TEST_F(RelayTest, ARunEndsAtARequestThatCannotBeSent) {
   // More often than requests may be outstanding.
   for (int refusals = 0; refusals < 100; ++refusals)
     ASSERT_EQ(client_.sendAs(int32Run({13, 14})), 0u) << "the queue is full";
-  for (const std::uint32_t id : {9, 10, 11, 12}) {
+  for (const std::uint32_t id : {9u, 10u, 11u, 12u}) {
     static_cast<void>(server_->reply(take()));
     EXPECT_EQ(next().route().requestId, id);
   }

@@ -40,7 +40,7 @@ class BusTurnsTest : public testing::Test {
 
 TEST_F(BusTurnsTest, IsFirstComeFirstServed) {
   ASSERT_TRUE(turns_.take(0, now()).ok());
-  for (const GpibUser user : {3, 1, 2}) takeBeside(user);
+  for (const GpibUser user : {3u, 1u, 2u}) takeBeside(user);
 
   turns_.give();
 

@@ -225,7 +225,7 @@ TEST_F(LineNoticesTest, PrecedeAnItemThatIsNotPlain) {
 
 TEST_F(LineNoticesTest, PrecedeTheItemsOfAnotherClient) {
   PlainRun run;
-  for (const std::uint32_t client : {1, 1, 2}) {
+  for (const std::uint32_t client : {1u, 1u, 2u}) {
     auto item = plain(1);
     item.client = client;
     run.append(item);
@@ -306,7 +306,7 @@ TEST_F(LinePlainTest, ReturnsRequestsThatWereNeverWritten) {
   settle();
   line_->send(plain(5));
   MessageRun run(MessageType::int32);
-  for (const std::uint32_t id : {6, 7}) {
+  for (const std::uint32_t id : {6u, 7u}) {
     run.add(EnvelopeWords::of({.requestId = id}, 1, layout::kFirstSlotBodyBytes));
     run.add(FirstBody{});
   }

@@ -99,7 +99,7 @@ TEST_F(SendQueueTest, KeepsTheOrderOfPlainItemsAndOthers) {
 
 TEST_F(SendQueueTest, SendsItemsThatCameTogether) {
   MessageRun run(MessageType::int32);
-  for (const std::uint32_t id : {2, 3}) {
+  for (const std::uint32_t id : {2u, 3u}) {
     run.add(EnvelopeWords::of({.requestId = id, .clientType = 7, .clientExtra = 8, .timeNs = 9}, 1,
                               layout::kFirstSlotBodyBytes));
     run.add(FirstBody{id, 0, 0});

@@ -176,7 +176,8 @@ TEST_F(DigitalIoServerTest, MergesTheChangesForAClientThatDoesNotReceiveForAWhil
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor}).status, 0);
   const auto change = [&](std::uint32_t mask, std::uint32_t bits) {
     model_->setInputs(mask, bits);
-    EXPECT_EQ(in_.next().value & mask, bits);  // other clients receive each change
+    // Other clients receive each change.
+    EXPECT_EQ(static_cast<std::uint32_t>(in_.next().value) & mask, bits);
   };
   for (int i = 0; i < kFlips; ++i) change(0x1, static_cast<std::uint32_t>(i % 2));
   change(0x4, 0);
