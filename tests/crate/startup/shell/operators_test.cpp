@@ -42,17 +42,18 @@ TEST(OperatorsTest, MovePointersWithinTheirString) {
   EXPECT_EQ(applyBinary("-", moved, text, 1).integer(), 2);
   EXPECT_EQ(applyUnary("*", moved, 1).integer(), 'c');
   EXPECT_EQ(applyBinary("==", text, integer(0), 1).integer(), 0);
-  EXPECT_THROW(applyBinary("+", text, integer(4), 1), LineError);
-  EXPECT_THROW(applyBinary("-", text, integer(INT64_MIN), 1), LineError);
+  EXPECT_THROW(static_cast<void>(applyBinary("+", text, integer(4), 1)), LineError);
+  EXPECT_THROW(static_cast<void>(applyBinary("-", text, integer(INT64_MIN), 1)), LineError);
 }
 
 TEST(OperatorsTest, RefuseWhatHasNoResult) {
-  EXPECT_THROW(applyBinary("/", integer(1), integer(0), 1), LineError);
-  EXPECT_THROW(applyBinary("%", integer(1), integer(0), 1), LineError);
-  EXPECT_THROW(applyBinary("%", Value::ofReal(1), integer(2), 1), LineError);
-  EXPECT_THROW(applyBinary("*", Value::ofString("a"), integer(2), 1), LineError);
-  EXPECT_THROW(applyBinary("+", Value::undefined("x"), integer(2), 1), LineError);
-  EXPECT_THROW(applyUnary("*", integer(2), 1), LineError);
+  EXPECT_THROW(static_cast<void>(applyBinary("/", integer(1), integer(0), 1)), LineError);
+  EXPECT_THROW(static_cast<void>(applyBinary("%", integer(1), integer(0), 1)), LineError);
+  EXPECT_THROW(static_cast<void>(applyBinary("%", Value::ofReal(1), integer(2), 1)), LineError);
+  EXPECT_THROW(static_cast<void>(applyBinary("*", Value::ofString("a"), integer(2), 1)), LineError);
+  EXPECT_THROW(static_cast<void>(applyBinary("+", Value::undefined("x"), integer(2), 1)),
+               LineError);
+  EXPECT_THROW(static_cast<void>(applyUnary("*", integer(2), 1)), LineError);
 }
 
 TEST(OperatorsTest, ResultOfAFailedCommandIsNotReportedAgain) {
