@@ -11,7 +11,7 @@
 
 // The table of the manual's source, examples/classic/devAiIp330Scan.cc, which is compiled with
 // another name for it: mpf.dbd has a table of that name.
-extern "C" dset* pvar_dset_devAiManual;
+extern "C" dset* pvar_dset_devAiManual;  // NOLINT(readability-identifier-naming): of EPICS Base
 
 namespace {
 
@@ -55,6 +55,7 @@ class Probe : public DevMpf {
     outOfBand = message->value;
     delete message;
   }
+  // NOLINTNEXTLINE(readability-identifier-naming): the manual's name
   static long dev_init(void* v) { return (new Probe(static_cast<aiRecord*>(v)))->getStatus(); }
 
   static inline std::promise<std::unique_ptr<Message>> received;

@@ -23,7 +23,7 @@ namespace {
 
 // Sanitizers have spin locks. A thread of an IOC that waits for one at a high real-time priority
 // keeps the processor from the thread that holds it, and from all other IOCs: they hang forever.
-[[maybe_unused]] const int areIocThreadsOrdinary =
+[[maybe_unused]] const int kAreIocThreadsOrdinary =
     mpf::test::kIsSanitized ? ::setenv("EPICS_ALLOW_POSIX_THREAD_PRIORITY_SCHEDULING", "NO", 1) : 0;
 
 }  // namespace

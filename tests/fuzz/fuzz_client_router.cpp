@@ -40,6 +40,7 @@ class SimulatedNetwork final : public kj::Network {
     explicit Address(Connect connect) : connect_(std::move(connect)) {}
     kj::Promise<kj::Own<kj::AsyncIoStream>> connect() override { return connect_(); }
     kj::Own<kj::ConnectionReceiver> listen() override {
+      // NOLINTNEXTLINE(bugprone-suspicious-semicolon): within the macro
       KJ_UNIMPLEMENTED("a client router does not listen");
     }
     kj::Own<kj::NetworkAddress> clone() override { return kj::heap<Address>(connect_); }

@@ -21,7 +21,9 @@ TEST(ConnectionTest, AFreeObjectIsReused) {
 }
 
 TEST(ConnectionTest, AFreeObjectHasANewLockInTheChildOfAFork) {
-  auto* const object = Connection::take().get();  // free again
+  auto former = Connection::take();
+  auto* const object = former.get();
+  former.reset();  // the object is free again
   const auto inherited = object->lock;
 
   const auto status = endOf([&] {

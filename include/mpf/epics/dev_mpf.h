@@ -169,6 +169,7 @@ struct MpfDset {
 }  // namespace mpf
 
 // Define and export a device support table `name`. `init` is a long (*)(dbCommon*).
+// NOLINTNEXTLINE(readability-identifier-naming): only for the macros below
 #define MPF_DSET_(name, init, number, convert)                                   \
   namespace {                                                                    \
   mpf::MpfDset name{{number, nullptr, nullptr, init, mpf::DevMpf::getIoIntInfo}, \

@@ -181,6 +181,7 @@ TEST_F(SupervisorTest, TakesOverAndSeesEndsWithoutPidfds) {
   const auto one = pidOf("int32");
 
   killSupervisor();
+  // NOLINTNEXTLINE(bugprone-suspicious-missing-comma): one argument
   start({"/usr/bin/env", "LD_PRELOAD=" MPF_TEST_NO_PIDFD, MPF, "run", files_.file("lab.toml")});
   waitForState("int32", "ready");
   EXPECT_EQ(pidOf("int32"), one);

@@ -142,8 +142,10 @@ int fakeGpibInterfaceClears() { return board.interfaceClears; }
 
 // ---- the functions of libgpib
 
+// NOLINTBEGIN(readability-identifier-naming): the library's names
 int ThreadIberr() { return lastError; }
 long ThreadIbcntl() { return lastCount; }
+// NOLINTEND(readability-identifier-naming)
 
 int ibask(int /*ud*/, int /*option*/, int* value) {
   if (const auto status = faultOf("ibask")) return *status;

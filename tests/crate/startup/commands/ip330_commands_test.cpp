@@ -14,7 +14,7 @@ class Ip330Commands : public StartupScene {
     const auto all = settingsOf(read(kModule + commands), "adc");
     return {all.begin() + 9, all.end()};
   }
-  const std::string kModule =
+  static inline const std::string kModule =
       kCarrier + "p = initIp330(\"adc\", \"ipac\", \"IP_a\", \"D\", \"-5to5\", 0, 15, 10, 120)\n";
 };
 
