@@ -25,7 +25,7 @@ using router::PlainItem;
 using router::PlainRun;
 using testing::ElementsAreArray;
 
-using Words = std::vector<capnp::word>;
+using Words = std::vector<std::uint64_t>;  // clang cannot copy a capnp::word
 
 Words wordsOf(kj::ArrayPtr<const kj::byte> bytes) {
   Words words(bytes.size() / sizeof(capnp::word));
@@ -36,7 +36,9 @@ Words wordsOf(kj::ArrayPtr<const kj::byte> bytes) {
 Words segmentOf(const Bytes& frame) {
   return wordsOf(kj::arrayPtr(frame.data(), frame.size()).slice(sizeof(capnp::word), frame.size()));
 }
-kj::ArrayPtr<const capnp::word> arrayOf(const Words& words) { return {words.data(), words.size()}; }
+kj::ArrayPtr<const capnp::word> arrayOf(const Words& words) {
+  return {reinterpret_cast<const capnp::word*>(words.data()), words.size()};
+}
 
 // All that is known of an item, as text.
 std::string describe(bool isRequest, bool isFirst, std::uint32_t client, std::uint32_t requestId,
@@ -196,7 +198,7 @@ TEST(PlainRun, HasTheSegmentTableOfAFrame) {
   const auto payload = wordsOf(run.payload());
   words.insert(words.end(), payload.begin(), payload.end());
   capnp::FlatArrayMessageReader reader(arrayOf(words));
-  EXPECT_EQ(reader.getEnd(), words.data() + words.size());
+  EXPECT_EQ(reader.getEnd(), arrayOf(words).end());
   EXPECT_EQ(reader.getRoot<wire::Frame>().getItems().size(), items.size());
 }
 
