@@ -144,27 +144,34 @@ class CrateCheck {
   }
 
   void checkCycles() {
+    std::set<const Process*> finished;
     for (const auto& process : crate_.processes) {
       std::vector<std::string> path;
-      if (findCycle(process, path)) {
-        errors_.add(process.placeOf("needs"),
+      if (findCycle(process, path, finished)) {
+        errors_.add(names_.at(path.front())->placeOf("needs"),
                     fmt::format("the needs form a cycle: {}; remove one of them",
                                 fmt::join(path, " needs ")));
         return;
       }
     }
   }
-  // Whether the needs of `process` lead back to the first process of `path`.
-  bool findCycle(const Process& process, std::vector<std::string>& path) {
+  // Whether the needs of `process` lead to a cycle, which is left in `path`.
+  //   path      the processes that lead to `process`
+  //   finished  processes whose needs lead to no cycle
+  bool findCycle(const Process& process, std::vector<std::string>& path,
+                 std::set<const Process*>& finished) {
+    if (finished.contains(&process)) return false;
+    const auto first = std::ranges::find(path, process.name);
+    const bool isCycle = first != path.end();
+    if (isCycle) path.erase(path.begin(), first);
     path.push_back(process.name);
-    if (path.size() > 1 && path.front() == process.name) return true;
-    if (path.size() <= crate_.processes.size()) {
-      for (const auto& need : process.needs) {
-        const auto found = names_.find(need);
-        if (found != names_.end() && findCycle(*found->second, path)) return true;
-      }
+    if (isCycle) return true;
+    for (const auto& need : process.needs) {
+      const auto found = names_.find(need);
+      if (found != names_.end() && findCycle(*found->second, path, finished)) return true;
     }
     path.pop_back();
+    finished.insert(&process);
     return false;
   }
 

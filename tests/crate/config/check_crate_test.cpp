@@ -55,6 +55,29 @@ TEST_F(CheckCrateTest, NeedsNameProcesses) {
               HasSubstr("the needs form a cycle: one needs b needs one"));
 }
 
+// Each process needs all earlier ones: there are 2^60 paths.
+TEST_F(CheckCrateTest, ManyNeedsTakeNoLongTime) {
+  std::string crate;
+  std::string needs;
+  for (int i = 0; i < 60; ++i) {
+    const auto name = "\"p" + std::to_string(i) + "\"";
+    crate += "[[program]]\nname = " + name + "\ncommand = \"a\"\n";
+    if (!needs.empty()) crate += "needs = [" + needs + "]\n";
+    needs += (needs.empty() ? "" : ", ") + name;
+  }
+
+  EXPECT_EQ(errorsOf(crate), "");
+}
+
+TEST_F(CheckCrateTest, ACycleBehindOtherProcessesIsReported) {
+  const auto program = [](const std::string& name, const std::string& needs) {
+    return "[[program]]\nname = \"" + name + "\"\ncommand = \"a\"\nneeds = [" + needs + "]\n";
+  };
+  EXPECT_THAT(errorsOf(program("a", "\"b\", \"c\"") + program("b", "\"c\"") +
+                       program("c", "\"d\"") + program("d", "\"c\", \"b\"")),
+              HasSubstr("lab.toml:12:9: the needs form a cycle: c needs d needs c; remove one"));
+}
+
 TEST_F(CheckCrateTest, ModulesAreOnCarriersOfTheCrate) {
   EXPECT_THAT(errorsOf(kDac), HasSubstr("carrier \"ipac\" is not in [carriers]; write [carriers]"));
   EXPECT_THAT(errorsOf("[carriers]\nipca = \"model\"\n" + kDac),
