@@ -112,11 +112,13 @@ class CrateCheck {
   }
 
   void checkServers(const Process& process) {
+    const auto location = process.location.value_or(crate_.location);
     for (const auto& server : serversOf(process)) {
-      const auto [first, isNew] = servers_.emplace(server, &process);
+      const auto [first, isNew] = servers_.emplace(std::pair(location, server), &process);
       if (!isNew)
         errors_.add(process.place, fmt::format("the server \"{}\" is also in the process \"{}\" of "
-                                               "{}; each name can be served once",
+                                               "{}; each name can be served once at a "
+                                               "location",
                                                server, first->second->name, first->second->place));
     }
   }
@@ -178,7 +180,7 @@ class CrateCheck {
   Crate& crate_;
   ConfigErrors& errors_;
   std::map<std::string, const Process*> names_;
-  std::map<std::string, const Process*> servers_;
+  std::map<std::pair<std::int32_t, std::string>, const Process*> servers_;  // by location and name
   std::map<std::string, const Process*> modules_;  // by "CARRIER SITE"
 };
 

@@ -33,6 +33,13 @@ TEST_F(CheckCrateTest, AServerIsInOneProcess) {
               HasSubstr("the server \"one\" is also in the process \"a\""));
 }
 
+TEST_F(CheckCrateTest, TheSameServerMayBeAtTwoLocations) {
+  EXPECT_EQ(errorsOf(kOne + "name = \"a\"\nlocation = 1\n" + kOne + "name = \"b\"\n"), "");
+  EXPECT_THAT(
+      errorsOf("location = 1\n" + kOne + "name = \"a\"\nlocation = 1\n" + kOne + "name = \"b\"\n"),
+      HasSubstr("each name can be served once at a location"));
+}
+
 TEST_F(CheckCrateTest, RequiredValues) {
   EXPECT_THAT(errorsOf("[[server]]\nprogram = \"dac128v\"\nmodule = \"dac\"\n"),
               HasSubstr("lab.toml:1:1: [[server]] of program \"dac128v\" has no carrier"));
