@@ -100,6 +100,7 @@ Crate CrateSource::readFile(ConfigErrors& errors) const {
   auto crate = readCrate(file_, errors);
   if (!name_.empty()) crate.name = checkedName(name_);
   const auto kinds = carrierKinds();
+  checkCarrierNames(crate, kinds, errors);
   for (auto& carrier : crate.carriers) {
     auto replaced = kinds.find(carrier.name);
     if (replaced == kinds.end()) replaced = kinds.find("");

@@ -194,6 +194,19 @@ std::string problemOfName(const std::string& name) {
       name);
 }
 
+void checkCarrierNames(const Crate& crate, const std::map<std::string, std::string>& kinds,
+                       ConfigErrors& errors) {
+  std::vector<std::string> carriers;
+  for (const auto& carrier : crate.carriers) carriers.push_back(carrier.name);
+  for (const auto& [name, kind] : kinds) {
+    if (name.empty() || std::ranges::find(carriers, name) != carriers.end()) continue;
+    errors.add("", fmt::format("--carrier {}={}: {} has no carrier \"{}\"; {}", name, kind,
+                               crate.file, name,
+                               carriers.empty() ? "it has no carriers: leave the option out"
+                                                : suggestion(name, carriers, "carriers")));
+  }
+}
+
 void checkCrate(Crate& crate, ConfigErrors& errors) { CrateCheck(crate, errors).run(); }
 
 }  // namespace mpf::crate

@@ -4,6 +4,7 @@
 // Threads  one.
 #pragma once
 
+#include <map>
 #include <string>
 
 #include "base/toml/config_errors.h"
@@ -20,6 +21,11 @@ namespace mpf::crate {
 // Checks what concerns several entries: names that are used twice, needs that form a circle,
 // modules that two processes drive, unknown carriers, missing values. Sets Process::isSound.
 void checkCrate(Crate& crate, ConfigErrors& errors);
+
+// Refuses names of carriers that the crate does not have: a misspelt one would replace nothing.
+//   kinds  kinds by name, as --carrier gives them; "" is for all carriers
+void checkCarrierNames(const Crate& crate, const std::map<std::string, std::string>& kinds,
+                       ConfigErrors& errors);
 
 // Names of crates and processes are names of folders and files. Returns what is wrong with one;
 // empty: nothing.

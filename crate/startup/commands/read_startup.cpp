@@ -124,6 +124,7 @@ Startup readStartup(const std::string& file, const StartupOptions& options) {
   if (startup.crate.processes.empty())
     errors.add(path.string(), "no command of the file starts a server, a router or an IOC");
   else checkCrate(startup.crate, errors);
+  checkCarrierNames(startup.crate, options.carriers, errors);
   checkCarriers(startup.crate, errors);
   errors.throwIfAny();
   return startup;

@@ -149,6 +149,22 @@ signal = "0=cosine:1"
   EXPECT_THAT(errors, HasSubstr("12:10: signal \"0=cosine:1\""));
 }
 
+TEST_F(RunCheckTest, AnOptionForAnUnknownCarrierIsAnError) {
+  static_cast<void>(files_.write("lab.toml", "carriers = {ipac = \"model\"}\n" + kServer));
+  static_cast<void>(files_.write("st.cmd",
+                                 "ipacAddCarrier(&vipc616_01, \"0x3000,0xa0000000\")\n"
+                                 "initIpacCarrier(\"ipac\", 0)\n"
+                                 "initDAC128V(\"dac\", \"ipac\", \"IP_a\", 20)\n"));
+  for (const std::string file : {"lab.toml", "st.cmd"}) {
+    const auto result = mpf("run --check --carrier ipca=model " + file);
+
+    EXPECT_EQ(WEXITSTATUS(result.status), 2) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("mpf run: --carrier ipca=model: "));
+    EXPECT_THAT(result.output, HasSubstr("did you mean \"ipac\"?"));
+    EXPECT_EQ(mpf("run --check --carrier ipac=model " + file).status, 0);
+  }
+}
+
 TEST_F(RunCheckTest, AFileWithOtherErrorsIsCheckedAsWell) {
   const auto errors = errorsOf("colour = 1\n" + kServer + "queue-size = 0\n");
 

@@ -85,6 +85,17 @@ TEST_F(CheckCrateTest, ACycleBehindOtherProcessesIsReported) {
               HasSubstr("lab.toml:12:9: the needs form a cycle: c needs d needs c; remove one"));
 }
 
+TEST_F(CheckCrateTest, NamesOfCarriersInOptionsAreThoseOfTheCrate) {
+  const auto crate = read(kCarrier + kDac);
+  ConfigErrors errors;
+
+  checkCarrierNames(crate, {{"", "model"}, {"ipac", "model"}, {"ipca", "tpci200"}}, errors);
+
+  ASSERT_EQ(errors.lines().size(), 1U);
+  EXPECT_THAT(errors.lines()[0], testing::StartsWith("--carrier ipca=tpci200: "));
+  EXPECT_THAT(errors.lines()[0], HasSubstr("did you mean \"ipac\"?"));
+}
+
 TEST_F(CheckCrateTest, ModulesAreOnCarriersOfTheCrate) {
   EXPECT_THAT(errorsOf(kDac), HasSubstr("carrier \"ipac\" is not in [carriers]; write [carriers]"));
   EXPECT_THAT(errorsOf("[carriers]\nipca = \"model\"\n" + kDac),
