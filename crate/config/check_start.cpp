@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <grp.h>
 #include <list>
 #include <pwd.h>
@@ -34,6 +35,26 @@ std::string problemOfUser(const std::string& user) {
   if (entry == nullptr) return fmt::format("user \"{}\": this host has no such user", user);
   if (::geteuid() == 0 || entry->pw_uid == ::geteuid()) return {};
   return fmt::format("user \"{}\": only root can start processes of another user", user);
+}
+
+// The carriers of models whose wires are in the folder of the crate, which only the user of the
+// supervisor can enter.
+std::vector<std::string> modelCarriersOf(const Crate& crate, const Process& process) {
+  std::vector<std::string> names;
+  for (const auto& module : modulesOf(process)) {
+    const auto carrier = std::ranges::find(crate.carriers, module.carrier, &Carrier::name);
+    if (carrier != crate.carriers.end() && carrier->kind == "model" &&
+        std::ranges::find(names, carrier->name) == names.end())
+      names.push_back(carrier->name);
+  }
+  return names;
+}
+
+// Whether the user exists, and is not the one of the supervisor.
+bool isOtherUser(const std::string& user) {
+  if (user.empty()) return false;
+  const auto* const entry = ::getpwnam(user.c_str());  // NOLINT(concurrency-mt-unsafe)
+  return entry != nullptr && entry->pw_uid != ::geteuid();
 }
 
 bool isProgram(const std::filesystem::path& path) {
@@ -120,6 +141,7 @@ class StartCheck {
     for (const auto& server : plan.servers)
       check(process.placeOf("servers"), [&] { SegmentName::checkServer(server); });
     if (const auto problem = problemOfUser(plan.user); !problem.empty()) refuse("user", problem);
+    else checkModels(process, plan.user);
     std::error_code error;
     if (!std::filesystem::is_directory(plan.workingFolder, error))
       return refuse(
@@ -127,6 +149,17 @@ class StartCheck {
           fmt::format("working-folder \"{}\": this host has no such folder", plan.workingFolder));
     if (!isFound(plan)) return refuse("command", textOfAbsent(process, plan.command.front()));
     if (!process.kind.empty() && errors_.lines().size() == before) startCheck(process, {});
+  }
+
+  void checkModels(const Process& process, const std::string& user) {
+    const auto carriers = modelCarriersOf(crate_, process);
+    if (carriers.empty() || !isOtherUser(user)) return;
+    add(placeOf(process, "user"),
+        fmt::format(
+            "user \"{}\": the process \"{}\" uses models (carrier \"{}\"), and their "
+            "wires are in a folder that only the user of `mpf run` can enter; run `mpf run` "
+            "as this user, or remove user",
+            user, process.name, fmt::join(carriers, "\", \"")));
   }
 
   void startCheck(const Process& process, const Keys& wrong) {

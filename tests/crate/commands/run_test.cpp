@@ -165,6 +165,23 @@ TEST_F(RunCheckTest, AnOptionForAnUnknownCarrierIsAnError) {
   }
 }
 
+TEST_F(RunCheckTest, ModelsAreOfTheUserOfTheSupervisor) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can start processes of other users";
+  const std::string crate = R"(carriers = {ipac = "model"}
+[[server]]
+program = "dac128v"
+module = "dac"
+carrier = "ipac"
+site = "IP_a"
+user = ")";
+
+  EXPECT_THAT(
+      errorsOf(crate + "nobody\"\n"),
+      HasSubstr("7:8: user \"nobody\": the process \"dac\" uses models (carrier \"ipac\")"));
+  static_cast<void>(files_.write("lab.toml", crate + "root\"\n"));
+  EXPECT_EQ(mpf("run --check lab.toml").status, 0);
+}
+
 TEST_F(RunCheckTest, AFileWithOtherErrorsIsCheckedAsWell) {
   const auto errors = errorsOf("colour = 1\n" + kServer + "queue-size = 0\n");
 
