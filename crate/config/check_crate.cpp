@@ -20,6 +20,20 @@ bool isFileName(const std::string& name) {
          std::ranges::all_of(name, isAllowed);
 }
 
+// What is wrong with the name of a variable of the environment; empty: nothing.
+std::string problemOfVariable(const std::string& name) {
+  if (name.empty() || name.find('=') != std::string::npos)
+    return "a name must not be empty and must not contain \"=\"; write NAME = \"VALUE\"";
+  if (name == "MPF_BACKPLANE")
+    return "it is set by the crate; write backplane = \"NAME\" at the top of the file";
+  if (name == "MPF_LOCATION")
+    return "it is set by the crate; write location = NUMBER at the top of the file, or in a "
+           "process such as [[server]]";
+  if (name == "NOTIFY_SOCKET")
+    return "it is set by the supervisor, if a [[program]] has notify = true; remove it here";
+  return {};
+}
+
 class CrateCheck {
  public:
   CrateCheck(Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
@@ -31,11 +45,14 @@ class CrateCheck {
       errors_.add(crate_.file,
                   "the crate starts nothing; write a [[server]], [[router]], [[ioc]] "
                   "or [[program]]");
+    if (const auto place = crate_.places.find("environment"); place != crate_.places.end())
+      checkEnvironment(crate_.environment, place->second);
     for (auto& process : crate_.processes) {
       const auto errorsBefore = errors_.lines().size();
       checkName(process);
       checkRequired(process);
       checkNeeds(process);
+      checkEnvironment(process.environment, process.placeOf("environment"));
       checkServers(process);
       checkModules(process);
       process.isSound = process.isSound && errors_.lines().size() == errorsBefore;
@@ -74,6 +91,7 @@ class CrateCheck {
                   "[[router]] has nothing to do; write file = \"router.toml\", "
                   "or serve and listen, or remote");
     checkGaps(process, kind);
+    for (const auto& key : kind.positionals) checkPositional(process, kind, key);
   }
 
   void requireKey(const Process& process, const ProgramKind& kind, std::size_t position) {
@@ -97,6 +115,23 @@ class CrateCheck {
             fmt::format("{} needs {}, too, because the program takes them in this order: {}", key,
                         *missing, fmt::join(kind.positionals, ", ")));
       }
+    }
+  }
+
+  void checkPositional(const Process& process, const ProgramKind& kind, const std::string& key) {
+    const auto* const setting = process.find(key);
+    if (setting == nullptr || setting->values.size() < 2 || !isPositional(process, kind, key))
+      return;
+    errors_.add(setting->place, fmt::format("{} is a list of {} values, but the program takes one "
+                                            "value here; write {} = \"...\"",
+                                            key, setting->values.size(), key));
+  }
+
+  void checkEnvironment(const std::map<std::string, std::string>& environment,
+                        const std::string& place) {
+    for (const auto& [name, value] : environment) {
+      if (const auto problem = problemOfVariable(name); !problem.empty())
+        errors_.add(place, fmt::format("environment: variable \"{}\": {}", name, problem));
     }
   }
 

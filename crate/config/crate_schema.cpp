@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "crate/config/crate_schema.h"
 
+#include <algorithm>
+
 #include "crate/config/program_kinds.h"
 
 namespace mpf::crate {
@@ -38,8 +40,11 @@ Json valueOf(const OptionKind& option) {
     for (const auto& field : option.fields) fields[field] = {{"type", {"string", "number"}}};
     one = {{"oneOf", {one, table(fields)}}};
   }
-  return {{"oneOf", {one, {{"type", "array"}, {"items", one}}}}};
+  return {{"oneOf", {one, {{"type", "array"}, {"items", one}, {"minItems", 1}}}}};
 }
+
+// A value of a key that is never an option.
+Json positional() { return {{"type", {"string", "number", "boolean"}}}; }
 
 Json supervisionKeys() {
   return {{"restart", {{"enum", {"always", "on-failure", "never"}}}},
@@ -76,8 +81,11 @@ Json programOf(const ProgramKind& kind) {
   required.insert(required.end(), kind.positionals.begin(),
                   kind.positionals.begin() + static_cast<std::ptrdiff_t>(kind.required));
   for (const auto& key : kind.keys()) {
+    if (keys.contains(key)) continue;
     const auto* const option = kind.findOption(key);
-    if (!keys.contains(key)) keys[key] = valueOf(option != nullptr ? *option : OptionKind{key, {}});
+    const bool isPositional = std::ranges::find(kind.positionals, key) != kind.positionals.end();
+    if (option != nullptr) keys[key] = valueOf(*option);
+    else keys[key] = isPositional ? positional() : valueOf(OptionKind{key, {}});
   }
   return table(keys, required);
 }

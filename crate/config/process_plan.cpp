@@ -37,12 +37,6 @@ void addCarriers(const Crate& crate, const Process& process, const std::string& 
   if (hasModel) command.push_back(fmt::format("--wires={}/wires", runFolder));
 }
 
-// "server" of the serial server is its first argument with `port`, otherwise an option.
-bool isPositional(const Process& process, const ProgramKind& kind, const std::string& key) {
-  if (kind.name == "serial" && key == "server") return process.find("port") != nullptr;
-  return std::ranges::find(kind.positionals, key) != kind.positionals.end();
-}
-
 void addOption(const Setting& setting, const OptionKind* option,
                std::vector<std::string>& command) {
   for (const auto& value : setting.values) {

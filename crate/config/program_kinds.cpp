@@ -183,6 +183,11 @@ const std::vector<std::string>& commonKeys() {
   return keys;
 }
 
+bool isPositional(const Process& process, const ProgramKind& kind, const std::string& key) {
+  if (kind.name == "serial" && key == "server") return process.find("port") != nullptr;
+  return std::ranges::find(kind.positionals, key) != kind.positionals.end();
+}
+
 std::vector<std::string> fieldsOf(const std::string& value) {
   std::vector<std::string> fields(1);
   for (const char one : value) {

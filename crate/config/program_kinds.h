@@ -46,6 +46,11 @@ struct ProgramKind {
 // The keys that every server program has, and that a crate may set for all of them.
 [[nodiscard]] const std::vector<std::string>& commonKeys();
 
+// Whether the value of `key` is an argument without the name of an option. "server" of the serial
+// server is its first argument with `port`, otherwise an option.
+[[nodiscard]] bool isPositional(const Process& process, const ProgramKind& kind,
+                                const std::string& key);
+
 // The names under which clients find the servers of a process.
 [[nodiscard]] std::vector<std::string> serversOf(const Process& process);
 

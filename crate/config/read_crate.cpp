@@ -88,6 +88,24 @@ std::string placeOfKey(const std::string& key) {
   return place != places.end() ? place->second : tablesWith(key);
 }
 
+// Command lines, variables and names of files end at a NUL character.
+void refuseNul(const TomlTable& root, const toml::node& node) {
+  constexpr const char* kRule =
+      "{} contains the character \\u0000, which no program can receive; remove it";
+  if (const auto* const text = node.as_string();
+      text != nullptr && text->get().find('\0') != std::string::npos)
+    root.refuse(node, fmt::format(kRule, "the text"));
+  if (const auto* const list = node.as_array())
+    for (const auto& one : *list) refuseNul(root, one);
+  if (const auto* const table = node.as_table()) {
+    for (const auto& [key, value] : *table) {
+      if (key.str().find('\0') != std::string_view::npos)
+        root.refuse(value, fmt::format(kRule, "the key of this value"));
+      refuseNul(root, value);
+    }
+  }
+}
+
 class CrateReader {
  public:
   CrateReader(Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
@@ -198,6 +216,9 @@ class CrateReader {
       if (auto value = readValue(table, one, option)) setting.values.push_back(std::move(*value));
     };
     if (const auto* const list = node->as_array()) {
+      if (list->empty())
+        table.refuse(*node,
+                     fmt::format("{} is an empty list; write at least one value", option.key));
       for (const auto& one : *list) take(one);
     } else {
       take(*node);
@@ -339,6 +360,8 @@ Crate readCrate(const std::string& file, ConfigErrors& errors) {
   crate.file = std::filesystem::absolute(file).lexically_normal().string();
   crate.name = std::filesystem::path(file).stem().string();
   TomlTable table(root, file, "", errors);
+  refuseNul(table, root);
+  errors.throwIfAny();
   CrateReader(crate, errors).readRoot(table);
   checkCrate(crate, errors);
   return crate;

@@ -15,7 +15,7 @@ namespace mpf::crate {
 //   throws  ConfigError with all errors, each with file, line and column
 [[nodiscard]] Crate readCrate(const std::string& file);
 // The same, but adds the errors to `errors`.
-//   throws  ConfigError when the file cannot be read or is not TOML
+//   throws  ConfigError when the file cannot be read, is not TOML, or has a text with NUL
 [[nodiscard]] Crate readCrate(const std::string& file, ConfigErrors& errors);
 
 // Checks what concerns several entries: names that are used twice, needs that form a circle,

@@ -40,6 +40,36 @@ TEST_F(CheckCrateTest, TheSameServerMayBeAtTwoLocations) {
       HasSubstr("each name can be served once at a location"));
 }
 
+TEST_F(CheckCrateTest, VariablesThatTheCrateSetsAreRefused) {
+  EXPECT_THAT(errorsOf(kOne + "environment = {MPF_BACKPLANE = \"x\"}\n"),
+              HasSubstr("lab.toml:4:15: environment: variable \"MPF_BACKPLANE\": it is set by the "
+                        "crate; write backplane = \"NAME\""));
+  EXPECT_THAT(errorsOf("[environment]\nMPF_LOCATION = 1\n" + kOne),
+              HasSubstr("lab.toml:1:1: environment: variable \"MPF_LOCATION\": it is set by the "
+                        "crate; write location = NUMBER"));
+  EXPECT_THAT(errorsOf(kOne + "environment = {NOTIFY_SOCKET = \"x\"}\n"),
+              HasSubstr("it is set by the supervisor"));
+}
+
+TEST_F(CheckCrateTest, NamesOfVariablesThatNoProgramCanReceiveAreRefused) {
+  EXPECT_THAT(errorsOf(kOne + "environment = {\"\" = \"x\"}\n"),
+              HasSubstr("variable \"\": a name must not be empty"));
+  EXPECT_THAT(errorsOf(kOne + "environment = {\"A=B\" = \"x\"}\n"),
+              HasSubstr("variable \"A=B\": a name must not be empty and must not contain \"=\""));
+}
+
+TEST_F(CheckCrateTest, AnArgumentWithoutAnOptionIsOneValue) {
+  EXPECT_THAT(errorsOf("[[server]]\nprogram = \"int32\"\nserver = [\"a\", \"b\"]\n"),
+              HasSubstr("lab.toml:3:10: server is a list of 2 values, but the program takes one "
+                        "value here; write server = \"...\""));
+  EXPECT_THAT(errorsOf("[[server]]\nprogram = \"int32\"\nserver = []\n"),
+              HasSubstr("lab.toml:3:10: server is an empty list; write at least one value"));
+  EXPECT_THAT(errorsOf("[[server]]\nprogram = \"serial\"\nport = \"/dev/a\"\n"
+                       "server = [\"a\", \"b\"]\n"),
+              HasSubstr("lab.toml:4:10: server is a list of 2 values"));
+  EXPECT_EQ(errorsOf("[[server]]\nprogram = \"int32\"\nserver = [\"a\"]\n"), "");
+}
+
 TEST_F(CheckCrateTest, RequiredValues) {
   EXPECT_THAT(errorsOf("[[server]]\nprogram = \"dac128v\"\nmodule = \"dac\"\n"),
               HasSubstr("lab.toml:1:1: [[server]] of program \"dac128v\" has no carrier"));

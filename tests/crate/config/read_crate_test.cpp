@@ -215,6 +215,17 @@ TEST_F(ReadCrateTest, AKeyOfAnotherTableIsNamedWithItsTable) {
   EXPECT_THAT(errorsOf(server + "queuesize = 7\n"), HasSubstr("did you mean \"queue-size\"?"));
 }
 
+TEST_F(ReadCrateTest, TextsWithNulAreRefused) {
+  for (const std::string line :
+       {R"(command = ["a\u0000b"])", R"(command = "a\u0000b")",
+        "command = \"a\"\nenvironment = {A = \"\\u0000\"}", "command = \"a\"\nuser = \"\\u0000\""})
+    EXPECT_THAT(errorsOf("[[program]]\nname = \"x\"\n" + line + "\n"),
+                HasSubstr("the text contains the character \\u0000"))
+        << line;
+  EXPECT_THAT(errorsOf("[environment]\n\"A\\u0000\" = 1\n[[server]]\nprogram = \"int32\"\n"),
+              HasSubstr("lab.toml:2:13: the key of this value contains the character \\u0000"));
+}
+
 }  // namespace
 }  // namespace mpf::crate::test
 // NOLINTEND(modernize-raw-string-literal)

@@ -18,6 +18,7 @@
 #include <mpf/sync_client.h>
 
 #include "base/process_stat.h"
+#include "base/program_beside.h"
 #include "tests/crate/supervisor/supervisor_fixture.h"
 #include "tests/support/router_pair.h"
 
@@ -108,13 +109,12 @@ plain = true
 listen = ")" +
             port_.address() +
             R"("
-[[router]]
+[[program]]
 name = "far"
-plain = true
-environment = { MPF_BACKPLANE = ")" +
-            far_.name() + R"(" }
-remote = "1=)" +
-            port_.address() + "\"\n" + ioc() + "[carriers]\nm = \"model\"\n",
+notify = true
+command = ["env", "MPF_BACKPLANE=)" +
+            far_.name() + "\", \"" + programBeside("mpf-router") + R"(", "--plain", "--remote=1=)" +
+            port_.address() + "\"]\n" + ioc() + "[carriers]\nm = \"model\"\n",
         "max-restarts = 1000000\n");
   }
   // An IOC with a record that asks the server "one", if the build has mpf-ioc.
