@@ -84,7 +84,7 @@ Value gpibSniff(CommandCall& call, StartupSite& site) {
   if (!call.isValid()) return Value::unavailable();
   auto sniffer = newProcess("", "sniff-" + name, call.place(), call.source());
   sniffer.command = {"mpf", "gpib-sniff", module->valueOf("server"), fmt::to_string(seconds)};
-  sniffer.needs = {module->name};
+  sniffer.needs = {module->valueOf("server")};
   sniffer.supervision.restart = crate::Restart::never;
   site.sniffers.push_back(std::move(sniffer));
   return Value();

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <iterator>
+#include <set>
 
 #include "base/toml/config_errors.h"
 #include "crate/config/program_kinds.h"
@@ -55,10 +56,25 @@ crate::Process iocProcess(const std::string& iocFile, const std::string& place,
 // A server keeps the name of its module, port or server; a second process with the same name gets
 // another one.
 void makeNamesUnique(std::vector<crate::Process>& processes) {
-  std::map<std::string, int> uses;
+  std::set<std::string> names;
+  for (const auto& process : processes) names.insert(process.name);
+  std::set<std::string> used;
+  for (auto& process : processes) {
+    if (used.insert(process.name).second) continue;
+    const auto name = process.name;
+    for (int use = 2; !names.insert(process.name).second; ++use)
+      process.name = fmt::format("{}-{}", name, use);
+  }
+}
+
+// Replaces the servers that processes need by the processes that serve them.
+void needProcesses(std::vector<crate::Process>& processes) {
+  std::map<std::string, std::string> processOf;
+  for (const auto& process : processes)
+    for (const auto& server : crate::serversOf(process)) processOf.emplace(server, process.name);
   for (auto& process : processes)
-    if (const int use = ++uses[process.name]; use > 1)
-      process.name = fmt::format("{}-{}", process.name, use);
+    for (auto& need : process.needs)
+      if (const auto found = processOf.find(need); found != processOf.end()) need = found->second;
 }
 
 // The boards of old startup files sit on buses that no Linux host reaches.
@@ -99,6 +115,7 @@ crate::Crate crateOf(StartupSite& site, const StartupOptions& options, const fs:
     crate.processes.push_back(iocProcess(options.iocFile, file.string(), environment));
   std::ranges::move(site.sniffers, std::back_inserter(crate.processes));
   makeNamesUnique(crate.processes);
+  needProcesses(crate.processes);
   return crate;
 }
 

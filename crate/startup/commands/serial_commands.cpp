@@ -112,10 +112,9 @@ Value serialPortSniff(CommandCall& call, StartupSite& site) {
   if (call.isValid() && server == nullptr)
     call.refuse(0, fmt::format("the port \"{}\" has no serial server at this line", port));
   if (!call.isValid()) return Value::unavailable();
-  const auto* const of = site.serialLines.findPort(port);
   auto sniffer = newProcess("", "sniff-" + port, call.place(), call.source());
   sniffer.command = {"mpf", "sniff", server->name, fmt::to_string(seconds)};
-  sniffer.needs = {processName(of->module.empty() ? port : of->module)};
+  sniffer.needs = {server->name};
   sniffer.supervision.restart = crate::Restart::never;
   site.sniffers.push_back(std::move(sniffer));
   return Value();

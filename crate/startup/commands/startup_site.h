@@ -26,6 +26,7 @@ struct StartupSite {
   SerialLines serialLines;
   std::deque<crate::Process> modules;  // DAC128V, IP330, digital I/O, GPIB; references stay valid
   std::deque<crate::Process> routers;
+  // Their needs are names of servers, because the names of processes may still change.
   std::deque<crate::Process> sniffers;
   IocFile ioc;
   std::optional<std::int32_t> location;  // localMessageRouterStart()

@@ -70,6 +70,25 @@ TEST_F(ReadStartup, TwoProcessesHaveTwoNames) {
   EXPECT_EQ(startup.crate.processes.at(1).name, "x-2");
 }
 
+// "P 0" and "P-0" would both be "P-0".
+TEST_F(ReadStartup, ASnifferNeedsTheProcessOfItsPort) {
+  const auto& processes = read(
+                              "initTtyPort(\"P 0\", \"/dev/ttyS0\", 9600)\n"
+                              "initTtyPort(\"P-0\", \"/dev/ttyS1\", 9600)\n"
+                              "initTtyPort(\"P-0-2\", \"/dev/ttyS2\", 9600)\n"
+                              "initSerialServer(\"a\", \"P 0\")\n"
+                              "initSerialServer(\"b\", \"P-0\")\n"
+                              "initSerialServer(\"c\", \"P-0-2\")\n"
+                              "serialPortSniff(\"P-0\", 10)\n")
+                              .crate.processes;
+
+  ASSERT_EQ(processes.size(), 4u);
+  EXPECT_EQ(processes[0].name, "P-0");
+  EXPECT_EQ(processes[1].name, "P-0-3");
+  EXPECT_EQ(processes[2].name, "P-0-2");
+  EXPECT_EQ(processes[3].needs, std::vector<std::string>{"P-0-3"});
+}
+
 TEST_F(ReadStartup, AServerNameTwiceIsAnErrorAtTheSecondLine) {
   EXPECT_THAT(errorOf("initTtyPort(\"p\", \"/dev/ttyS0\", 9600)\n"
                       "initTtyPort(\"q\", \"/dev/ttyS1\", 9600)\n"
