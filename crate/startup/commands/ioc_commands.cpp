@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <numeric>
 #include <system_error>
 #include <vector>
 
@@ -33,14 +34,28 @@ std::string findFile(CommandCall& call, const std::string& file, std::size_t fol
   return {};
 }
 
+// Adds a command of an IOC, unless iocsh cannot read one of its arguments.
+//   positions  of the arguments in the command of the startup file
+Value addToIoc(CommandCall& call, StartupSite& site, const std::string& command,
+               const std::vector<std::string>& arguments,
+               const std::vector<std::size_t>& positions) {
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (const auto problem = problemOfArgument(arguments[i]); !problem.empty())
+      call.refuse(positions[i], fmt::format("the argument \"{}\" {}", arguments[i], problem));
+  }
+  if (!call.isValid()) return Value::unavailable();
+  site.ioc.add(command, arguments, call.source());
+  return Value();
+}
+
 Value loadRecords(CommandCall& call, StartupSite& site, std::size_t macrosAt,
                   std::size_t folderAt) {
   const auto file = call.text(0, "file");
   const auto macros = call.textOr(macrosAt, "macros", "");
   if (!call.isValid()) return Value::unavailable();
   const auto path = findFile(call, file, folderAt);
-  if (!path.empty()) site.ioc.add("dbLoadRecords", {path, macros}, call.source());
-  return Value();
+  if (path.empty()) return Value();
+  return addToIoc(call, site, "dbLoadRecords", {path, macros}, {0, macrosAt});
 }
 
 // dbLoadRecords("file", "macros"[, folder])
@@ -61,12 +76,14 @@ Value dbLoadTemplate(CommandCall& call, StartupSite& site) {
   const auto file = call.text(0, "file");
   if (!call.isValid()) return Value::unavailable();
   const auto path = findFile(call, file, 1);
-  if (!path.empty()) site.ioc.add("dbLoadTemplate", {path}, call.source());
-  return Value();
+  if (path.empty()) return Value();
+  return addToIoc(call, site, "dbLoadTemplate", {path}, {0});
 }
 
 Value passOn(CommandCall& call, StartupSite& site) {
   std::vector<std::string> arguments;
+  std::vector<std::size_t> positions(call.size());
+  std::iota(positions.begin(), positions.end(), std::size_t{0});
   for (std::size_t i = 0; i < call.size(); ++i) {
     const auto value = call.value(i);
     if (const auto text = value.text()) arguments.push_back(*text);
@@ -74,8 +91,7 @@ Value passOn(CommandCall& call, StartupSite& site) {
     else call.text(i, "argument");
   }
   if (!call.isValid()) return Value::unavailable();
-  site.ioc.add(call.commandName(), arguments, call.source());
-  return Value();
+  return addToIoc(call, site, call.commandName(), arguments, positions);
 }
 
 constexpr CommandEntry kIocCommands[] = {

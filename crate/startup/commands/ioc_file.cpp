@@ -1,9 +1,21 @@
 // SPDX-License-Identifier: MIT
 #include "crate/startup/commands/ioc_file.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 
 namespace mpf::startup {
+
+std::string problemOfArgument(std::string_view text) {
+  if (std::ranges::any_of(text,
+                          [](unsigned char c) { return (c < ' ' && c != '\t') || c == 0x7f; }))
+    return "contains a control character, such as the end of a line, which the command of an IOC "
+           "cannot contain; remove it";
+  if (text.find('"') != std::string_view::npos && text.find('\'') != std::string_view::npos)
+    return "contains both kinds of quotes, which the command of an IOC cannot contain; use one of "
+           "them";
+  return {};
+}
 
 // Inside quotes, iocsh takes each character as it is.
 std::string iocshQuoted(std::string_view text) {

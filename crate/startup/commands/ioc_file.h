@@ -28,7 +28,10 @@ class IocFile {
   bool isNeeded_ = false;
 };
 
-// An argument in quotes.
+// What is wrong with an argument that iocsh cannot read, in quotes or without; empty: nothing.
+[[nodiscard]] std::string problemOfArgument(std::string_view text);
+
+// An argument in quotes. It has no problem.
 [[nodiscard]] std::string iocshQuoted(std::string_view text);
 
 }  // namespace mpf::startup

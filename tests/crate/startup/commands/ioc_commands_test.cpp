@@ -68,6 +68,15 @@ TEST_F(IocCommands, OtherCommandsArePassedOnWithTheirLine) {
             "# st.cmd:4: dbpf(\"b\", 5)\ndbpf(\"b\", \"5\")\n");
 }
 
+TEST_F(IocCommands, ATextThatIocshCannotReadIsAnError) {
+  EXPECT_THAT(errorOf("dbpf(\"x.DESC\", \"a\\nb\")\niocInit\n"),
+              HasSubstr("dbpf: the argument \"a\\nb\" contains a control character"));
+  EXPECT_THAT(errorOf("dbpf(\"x.DESC\", \"a'b\\\"c\")\niocInit\n"),
+              HasSubstr("contains both kinds of quotes"));
+  EXPECT_THAT(errorOf("dbLoadRecords(\"meter.db\", \"P=x:\\r\", ip)\niocInit\n"),
+              HasSubstr("1:27: error: dbLoadRecords: the argument \"P=x:\\r\" contains"));
+}
+
 TEST_F(IocCommands, ReportsAloneNeedNoIoc) {
   EXPECT_THAT(errorOf("mrr\nmsr \"adc\"\n"), HasSubstr("no command of the file starts"));
 }
