@@ -36,6 +36,7 @@ using tools::value;
 namespace {
 
 constexpr std::size_t kMostFileBytes = std::size_t{256} << 20;
+constexpr int kMostDepth = 100;  // of its JSON; functions that show it are recursive
 
 Tree describe(const layout::Histogram& histogram) {
   const auto latencies = tools::Latencies::of(histogram);
@@ -219,7 +220,13 @@ nlohmann::ordered_json readCapsule(const std::string& path) {
   text.resize(static_cast<std::size_t>(
       checkCall(::pread(file.get(), text.data(), text.size(), 0), "read", path)));
   try {
-    auto tree = Tree::parse(text);
+    auto tree = Tree::parse(text, [&](int depth, Tree::parse_event_t, Tree&) {
+      if (depth > kMostDepth)
+        throw std::runtime_error(
+            fmt::format("{}: not a capsule, or damaged: more than {} nested lists and objects",
+                        path, kMostDepth));
+      return true;
+    });
     const auto version = tree.at("mpfCapsule").get<int>();
     if (version != kCapsuleVersion) {
       throw std::runtime_error(fmt::format("{}: a capsule of version {}; this program reads {}",

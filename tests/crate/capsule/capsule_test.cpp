@@ -15,6 +15,9 @@ using Tree = nlohmann::ordered_json;
 
 class CapsuleTest : public CrashTest {};
 
+// Functions that are recursive would end with SIGSEGV.
+const std::string kDeepList = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+
 // MPF_TEST_CAPSULES servers die, each in the middle of another request, and leave as many files.
 TEST_F(CapsuleTest, NamesTheRequestThatWasBeingHandled) {
   const auto* const wanted = std::getenv("MPF_TEST_CAPSULES");
@@ -75,10 +78,26 @@ TEST_F(CapsuleTest, ReportsADamagedFileByName) {
   const auto garbage = files_.write("a", "{\"mpfCapsule\": 1, ");
   const auto newer = files_.write("b", "{\"mpfCapsule\": 7}");
   const auto other = files_.write("c", "[]");
+  const auto deep = files_.write("d", "{\"mpfCapsule\": 1, \"log\": " + kDeepList + "}");
 
-  for (const auto& file : {garbage, newer, other})
+  for (const auto& file : {garbage, newer, other, deep})
     EXPECT_THAT([&] { static_cast<void>(readCapsule(file)); },
                 testing::ThrowsMessage<std::runtime_error>(testing::StartsWith(file)));
+}
+
+TEST_F(CapsuleTest, ADamagedFileDoesNotEndTheList) {
+  const auto folder = files_.path() / "capsules";
+  const auto file = CapsuleStore(folder).add({{"mpfCapsule", 1}, {"process", "sound"}});
+  static_cast<void>(files_.write("capsules/0.capsule.json", "{\"log\": " + kDeepList + "}"));
+
+  const auto result =
+      mpf::test::runCommand(std::string(MPF) + " capsule --json --folder " + folder.string());
+
+  EXPECT_EQ(result.status, 0);
+  const auto list = Tree::parse(result.output);
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_THAT(list[0].at("problem"), testing::HasSubstr("more than 100 nested lists"));
+  EXPECT_EQ(list[1].at("file"), file);
 }
 
 TEST_F(CapsuleTest, ContainsTheEndOfTheLog) {
