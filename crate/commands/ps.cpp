@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <fmt/format.h>
 #include <fstream>
 #include <limits>
@@ -23,7 +24,6 @@
 #include "base/process_stat.h"
 #include "base/run_main.h"
 #include "base/system_call.h"
-#include "base/whole_file.h"
 #include "crate/commands/commands.h"
 #include "crate/commands/control.h"
 #include "crate/supervisor/child_process.h"
@@ -186,11 +186,36 @@ std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
   }
 }
 
+struct LogText {
+  std::string text;
+  std::int64_t end = 0;  // its offset in the file
+};
+
+// Reads a log without the hole at its beginning, which may be far longer than the text: the
+// supervisor removes old text by punching holes.
+LogText readLog(const std::string& path) {
+  const FileDescriptor file(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));
+  LogText log;
+  log.end = checkCall(::lseek(file.get(), 0, SEEK_END), "lseek", path);
+  const auto begin = ::lseek(file.get(), 0, SEEK_DATA);
+  if (begin < 0 && errno == ENXIO) return log;  // the file is empty, or a hole
+  log.end = std::max<std::int64_t>(0, begin);  // some file systems cannot seek data
+  std::array<char, 65536> bytes{};
+  for (;;) {
+    const auto length = checkCall(
+        retryInterrupted([&] { return ::pread(file.get(), bytes.data(), bytes.size(), log.end); }),
+        "read", path);
+    if (length == 0) return log;
+    log.text.append(bytes.data(), static_cast<std::size_t>(length));
+    log.end += length;
+  }
+}
+
 int showLog(const LogArguments& arguments) try {
   const auto path = chooseFiles(arguments.crate).log(arguments.process);
-  const auto text = readWholeFile(path);
-  if (!text.empty()) fmt::print("{}", printableLines(lastLines(text, arguments.lines)));
-  if (arguments.follow) follow(path, static_cast<std::int64_t>(text.size()));
+  const auto log = readLog(path);
+  if (!log.text.empty()) fmt::print("{}", printableLines(lastLines(log.text, arguments.lines)));
+  if (arguments.follow) follow(path, log.end);
   return 0;
 } catch (const std::system_error& error) {
   if (error.code().value() != ENOENT) throw;

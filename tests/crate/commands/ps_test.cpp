@@ -127,6 +127,25 @@ TEST_F(LogsTest, ShowsNothingOfALogThatIsAHole) {
   EXPECT_EQ(runCommand(command_).status, 0);
 }
 
+// The hole is longer than the memory that the test allows.
+TEST_F(LogsTest, DoesNotReadTheHoleOfALog) {
+  append("");
+  std::filesystem::resize_file(log_, std::size_t{3} << 30);
+  const auto limited = "ulimit -v 2000000; " + command_;
+  const auto hole = runCommand(limited + "2>&1");
+  append("one\ntwo\n");
+  const auto text = runCommand(limited + "2>&1");
+  mpf::test::Program logs({"/bin/sh", "-c", "exec " + command_ + "-n 1 -f >&2"});
+  ASSERT_EQ(logs.line(), "two");
+
+  append("three\n");
+
+  EXPECT_EQ(logs.line(), "three");
+  EXPECT_EQ(hole.output, "");
+  EXPECT_EQ(hole.status, 0);
+  EXPECT_EQ(text.output, "one\ntwo\n");
+}
+
 TEST_F(LogsTest, FollowsALogThatIsShortened) {
   append(std::string(std::size_t{3} << 16, '\n') + "last\n");
   mpf::test::Program logs({"/bin/sh", "-c", "exec " + command_ + "-n 1 -f >&2"});
