@@ -24,11 +24,15 @@ void RecordingWriter::write(capnp::MessageBuilder& record) {
 
 RecordingReader::RecordingReader(std::string path)
     : path_(std::move(path)),
-      file_(checkCall(::open(path_.c_str(), O_RDONLY | O_CLOEXEC), "open", path_)),
+      // O_NONBLOCK: the open of a FIFO would wait for a writer
+      file_(checkCall(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK), "open", path_)),
       stream_(file_.get()),
       buffered_(stream_) {
   struct stat status{};
   checkCall(::fstat(file_.get(), &status), "look at", path_);
+  if (!S_ISREG(status.st_mode))
+    throw std::runtime_error(fmt::format(
+        "{}: not a regular file; name a recording that `mpf tap --write` wrote", path_));
   bytes_ = static_cast<std::uint64_t>(status.st_size);
   limits_ = ConversionLimits{.maxValueBytes = bytes_}.readerOptions();
 }

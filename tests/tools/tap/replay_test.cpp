@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `mpf replay`: sends recordings again, and reports what became of the requests.
+#include <sys/stat.h>
+
 #include <filesystem>
 
 #include "tests/tools/tap/tap_fixture.h"
@@ -115,6 +117,15 @@ TEST_F(ReplayTest, SendsToAnotherServerAndReportsWhatIsNotAnswered) {
   thread.join();
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.out, "2 requests of 1 client to \"other\": 0 replied, 2 refused\n");
+}
+
+TEST_F(ReplayTest, NamesAFileThatIsNotARegularFile) {
+  ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
+
+  const auto ended = run({"replay", file_});
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.err, HasSubstr(file_ + ": not a regular file; name a recording"));
 }
 
 TEST_F(ReplayTest, ARecordingWithoutARequestIsAnError) {
