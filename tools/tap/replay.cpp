@@ -144,7 +144,7 @@ class Replayer {
       ++ends_[std::string(mpf::toString(fate->fate))];
       --open_;
     } else if (message.getType() != MessageType::connect && message.route().requestId != 0 &&
-               open_ > 0) {
+               (message.route().flags & kEndsRequest) != 0 && open_ > 0) {  // no further reply
       ++replied_;
       --open_;
     }

@@ -119,6 +119,35 @@ TEST_F(ReplayTest, SendsToAnotherServerAndReportsWhatIsNotAnswered) {
   EXPECT_EQ(ended.out, "2 requests of 1 client to \"other\": 0 replied, 2 refused\n");
 }
 
+// The further replies of one request do not count as replies to another.
+TEST_F(ReplayTest, ARequestWithoutAReplyIsAnErrorAlsoBesideASubscription) {
+  {
+    const EchoThread echo(backplane_, "echo");
+    SyncClient client(backplane_, "echo");
+    callMany(client, 0, 1);
+    const auto tool = tap({"--write", file_, "--count", "4"});
+    callMany(client, 0, 2);
+    EXPECT_EQ(tool->end().status, 0);
+  }
+  MessageServer server(backplane_, "echo");
+  std::vector<Int32Message> kept;
+  server.on<Int32>([&](Int32Message&& request) {
+    kept.push_back(std::move(request));
+    const std::vector<Int32> replies(3);
+    if (kept.size() == 1) server.replyMany<Int32>(kept.front(), replies);
+  });
+  std::thread thread([&] { server.run(); });
+
+  const auto ended = run({"replay", file_, "--speed", "0", "--timeout", "2", "--json"});
+
+  server.interrupt();
+  thread.join();
+  EXPECT_EQ(ended.status, 1);
+  const auto report = nlohmann::json::parse(ended.out);
+  EXPECT_LE(report.at("replied"), 1);
+  EXPECT_TRUE(report.at("ends").contains("no reply yet")) << ended.out;
+}
+
 TEST_F(ReplayTest, NamesAFileThatIsNotARegularFile) {
   ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
 
