@@ -130,6 +130,7 @@ int stopCrate(const ControlArguments& arguments) {
                       folder.name(), timeText(arguments.wait)));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
+  if (const auto text = textOfUnsupervised(folder); !text.empty()) throw std::runtime_error(text);
   fmt::print("the crate \"{}\" has stopped\n", folder.name());
   return 0;
 }

@@ -92,6 +92,21 @@ TEST_F(ControlTest, AStopNamesTheProcessesThatContinue) {
   EXPECT_EQ(stateOf("user"), "ready");
 }
 
+TEST_F(ControlTest, AStopFailsWhenTheSupervisorIsKilledBeforeItsProcesses) {
+  run("[[program]]\nname = \"deaf\"\n"
+      "command = [\"sh\", \"-c\", \"trap '' TERM; echo on; exec sleep 1000\"]\n");
+  ASSERT_NE(supervisor_->waitForLine("deaf | on"), "");
+  const auto pid = pidOf("deaf");
+  mpf::test::Program stop({MPF, "stop", "--crate", "lab", "--wait", "900"});
+  waitForState("deaf", "stopping");
+
+  killSupervisor();
+
+  EXPECT_EQ(WEXITSTATUS(stop.wait()), 1);
+  EXPECT_THAT(stop.errors(), HasSubstr("the supervisor of the crate \"lab\" has ended; 1 of"));
+  ::kill(pid, SIGKILL);
+}
+
 TEST_F(ControlTest, AProcessThatIsNotReadySaysWhatIsMissing) {
   run("[[program]]\nname = \"mute\"\ncommand = [\"sleep\", \"1000\"]\nservers = [\"never\"]\n"
       "start-time = \"1ms\"\n");
