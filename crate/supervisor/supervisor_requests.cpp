@@ -10,10 +10,26 @@
 
 #include "base/print_error.h"
 #include "base/service_manager.h"
+#include "base/toml/config_errors.h"
 #include "crate/supervisor/service_json.h"
 #include "crate/supervisor/supervisor.h"
 
 namespace mpf::crate {
+namespace {
+
+// The folder of a crate, and so its lock and its socket, have its name.
+void checkName(const Crate& fresh, const CrateFolder& folder) {
+  if (fresh.name == folder.name()) return;
+  const auto place = fresh.places.find("name");
+  ConfigErrors errors;
+  errors.add(place != fresh.places.end() ? place->second : fresh.file,
+             fmt::format("name: \"{}\" was \"{}\"; a reload cannot rename a crate: `mpf stop` it, "
+                         "and start it again",
+                         fresh.name, folder.name()));
+  errors.throwIfAny();
+}
+
+}  // namespace
 
 nlohmann::json Supervisor::answer(const nlohmann::json& request) {
   const std::string what = request.at("do");
@@ -65,6 +81,7 @@ std::vector<std::string> Supervisor::apply(const std::vector<ProcessPlan>& plans
 std::vector<std::string> Supervisor::reload() try {
   ServiceManager::notifyReloading();
   auto fresh = load_();
+  checkName(fresh, folder_);
   auto changed = apply(planProcesses(fresh, folder_.path().string()));
   crate_ = std::move(fresh);
   logs_.setMaxBytes(crate_.maxLogBytes);

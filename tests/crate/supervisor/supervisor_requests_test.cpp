@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "base/toml/config_errors.h"
 #include "crate/capsule/capsule_store.h"
 #include "tests/crate/supervisor/supervisor_fixture.h"
 
@@ -107,6 +108,22 @@ TEST_F(SupervisorRequestsTest, AnInvalidFileChangesNothing) {
 
   EXPECT_EQ(pidOf("int32"), one);
   EXPECT_EQ(stateOf("int32"), "ready");
+}
+
+TEST_F(SupervisorRequestsTest, AReloadDoesNotRenameTheCrate) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto pid = pidOf("int32");
+  static_cast<void>(files_.write("lab.toml", "name = \"new\"\n" + kServer + "queue-size = 7\n"));
+
+  EXPECT_THAT([&] { ask({{"do", "reload"}}); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr(
+                  "lab.toml:1:8: name: \"new\" was \"lab\"; a reload cannot rename a crate")));
+
+  EXPECT_EQ(pidOf("int32"), pid);
+  stop();
+  start({MPF, "run", "--name", "lab", files_.file("lab.toml")});
+  EXPECT_NO_THROW(ask({{"do", "reload"}}));
 }
 
 TEST_F(SupervisorRequestsTest, ATakenOverProcessThatTheCrateHasNoMoreIsEndedBesideNewOnes) {
