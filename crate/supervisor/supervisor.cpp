@@ -107,7 +107,7 @@ void Supervisor::beginShutdown() {
 
 Supervisor::Member* Supervisor::find(const std::string& name) {
   const auto found = std::ranges::find_if(members_, [&](const auto& member) {
-    return !member->isRemoved && member->service.plan().name == name;
+    return member && !member->isRemoved && member->service.plan().name == name;
   });
   return found != members_.end() ? found->get() : nullptr;
 }

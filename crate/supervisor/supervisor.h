@@ -92,6 +92,7 @@ class Supervisor {
   [[nodiscard]] bool areNeedsReady(const Service& service) const;
   // Whether a process that runs needs this one.
   [[nodiscard]] bool hasDependants(const Service& service) const;
+  // A member that apply() has moved already is not found.
   Member* find(const std::string& name);
   Member& memberOf(const nlohmann::json& request);
 

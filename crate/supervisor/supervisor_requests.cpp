@@ -47,7 +47,7 @@ nlohmann::json Supervisor::answer(const nlohmann::json& request) {
 }
 
 // Takes these plans in place of the present ones. Processes whose plans are unchanged continue.
-// Returns the names of the others.
+// Returns the names of the others, without those that the user has stopped: they stay stopped.
 std::vector<std::string> Supervisor::apply(const std::vector<ProcessPlan>& plans) {
   for (const auto& plan : plans) {  // first what may fail: then nothing has changed
     logs_.add(plan.name, folder_.log(plan.name));
@@ -63,7 +63,10 @@ std::vector<std::string> Supervisor::apply(const std::vector<ProcessPlan>& plans
       fresh.push_back(std::move(*found));
     } else {
       fresh.push_back(std::make_unique<Member>(plan));
-      changed.push_back(plan.name);
+      const auto* const replaced = find(plan.name);
+      if (replaced != nullptr && replaced->service.isStopRequested())
+        fresh.back()->service.requestStop(Clock::nowNs());
+      else changed.push_back(plan.name);
     }
   }
   // The others end. Those that are replaced are first in the list, so that their successors wait.

@@ -110,6 +110,21 @@ TEST_F(SupervisorRequestsTest, AnInvalidFileChangesNothing) {
   EXPECT_EQ(stateOf("int32"), "ready");
 }
 
+TEST_F(SupervisorRequestsTest, AReloadStartsNoProcessThatTheUserHasStopped) {
+  run(kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
+  waitForState("int32", "ready");
+  ask({{"do", "stop"}, {"name", "int32"}});
+  waitForState("int32", "stopped");
+  write(kServer + "queue-size = 7\n" + kServer +
+        "name = \"two\"\nserver = \"Two\"\nqueue-size = 7\n");
+
+  EXPECT_EQ(ask({{"do", "reload"}}).at("changed"), nlohmann::json::array({"two"}));
+
+  EXPECT_EQ(stateOf("int32"), "stopped");
+  ask({{"do", "start"}, {"name", "int32"}});
+  waitForState("int32", "ready");
+}
+
 TEST_F(SupervisorRequestsTest, AReloadDoesNotRenameTheCrate) {
   run(kServer);
   waitForState("int32", "ready");
