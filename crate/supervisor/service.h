@@ -72,10 +72,11 @@ class Service {
 
   [[nodiscard]] const ProcessPlan& plan() const noexcept { return plan_; }
   [[nodiscard]] ServiceState state() const noexcept { return state_; }
-  // Whether it stays in its state without an event: ready, failed or stopped.
+  // Whether the start of the crate is over for it: it is not starting or stopping, or has ended
+  // before, and may do so for ever. One that still waits after action() waits for another one.
   [[nodiscard]] bool isSettled() const noexcept {
-    return state_ == ServiceState::ready || state_ == ServiceState::failed ||
-           state_ == ServiceState::stopped;
+    return !recentEndsNs_.empty() ||
+           (state_ != ServiceState::starting && state_ != ServiceState::stopping);
   }
   [[nodiscard]] bool isRunning() const noexcept { return pid_ != 0; }
   [[nodiscard]] bool isStopRequested() const noexcept { return isStopRequested_; }

@@ -362,6 +362,7 @@ void Supervisor::wait() {
   if (Clock::nowNs() >= nextLookNs_) look();
 }
 
+// After act(): a process that still waits needs one that is not ready.
 void Supervisor::reportStatus() {
   if (ServiceManager::watchdogTime()) ServiceManager::notifyAlive();
   std::size_t ready = 0;

@@ -60,6 +60,26 @@ TEST_F(ServiceTest, StartsWhenItsNeedsAreReady) {
   EXPECT_EQ(service_.nextActionNs(), std::nullopt);
 }
 
+// A server whose device is absent must not delay the start of the crate for ever.
+TEST_F(ServiceTest, IsSettledWhenItIsReadyOrHasFailedOnce) {
+  start();
+  EXPECT_FALSE(service_.isSettled());
+  service_.becameReady(now_);
+  EXPECT_TRUE(service_.isSettled());
+  service_.requestRestart(now_);
+  EXPECT_FALSE(service_.isSettled());
+  end(exited(0));
+  start();
+  EXPECT_FALSE(service_.isSettled());
+
+  end(exited(1));
+
+  EXPECT_TRUE(service_.isSettled());
+  pass(1s);
+  start();
+  EXPECT_TRUE(service_.isSettled()) << "starting again";
+}
+
 TEST_F(ServiceTest, RestartsWithPausesThatGrow) {
   for (const auto pause : {100ms, 200ms, 300ms}) {
     becomeReady();

@@ -15,6 +15,7 @@
 
 #include "base/whole_file.h"
 #include "crate/supervisor/crate_state.h"
+#include "crate/supervisor/notify_socket.h"
 #include "tests/crate/supervisor/supervisor_fixture.h"
 
 // NOLINTBEGIN(modernize-raw-string-literal): a crate is one line
@@ -121,6 +122,22 @@ TEST_F(SupervisorTest, AProcessWaitsForOneThatFails) {
   waitForState("b", "failed");
 
   EXPECT_EQ(stateOf("a"), "waiting");
+}
+
+TEST_F(SupervisorTest, TellsSystemdThatItIsReadyAlthoughAProcessFailsForEver) {
+  const NotifySocket systemd;
+  ::setenv("NOTIFY_SOCKET", systemd.name().c_str(), 1);
+
+  run(kServer +
+          "[[program]]\nname = \"absent\"\ncommand = [\"sh\", \"-c\", \"exit 1\"]\n"
+          "servers = [\"never\"]\n[[program]]\nname = \"user\"\n"
+          "command = [\"sleep\", \"1000\"]\nneeds = [\"absent\"]\n",
+      "max-restarts = 1000000\n");
+  ::unsetenv("NOTIFY_SOCKET");
+
+  while (!systemd.takeReady()) continue;
+  EXPECT_EQ(stateOf("int32"), "ready");
+  EXPECT_EQ(stateOf("user"), "waiting");
 }
 
 // The server is replaced while clients call it: no call fails, and none gets the wrong reply.
