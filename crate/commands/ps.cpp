@@ -9,11 +9,13 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <fmt/format.h>
 #include <fstream>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <system_error>
 
 #include <mpf/clock.h>
 
@@ -167,6 +169,7 @@ std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
 }
 
 // Prints what is appended to the file, until a signal ends the program.
+//   throws  std::system_error, for example when stdout is full
 [[noreturn]] void follow(const std::string& path, std::int64_t offset) {
   const FileDescriptor events(checkCall(::inotify_init1(IN_CLOEXEC), "inotify_init1"));
   checkCall(::inotify_add_watch(events.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
@@ -180,7 +183,7 @@ std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
       offset += length;
       fmt::print("{}", printableLines({bytes.data(), static_cast<std::size_t>(length)}));
     }
-    std::fflush(stdout);
+    if (std::fflush(stdout) != 0) throw std::system_error(errno, std::generic_category(), "write");
     checkCall(retryInterrupted([&] { return ::read(events.get(), bytes.data(), bytes.size()); }),
               "read", "inotify");
   }

@@ -146,6 +146,15 @@ TEST_F(LogsTest, DoesNotReadTheHoleOfALog) {
   EXPECT_EQ(text.output, "one\ntwo\n");
 }
 
+TEST_F(LogsTest, FollowingEndsWhenTheOutputIsFull) {
+  append("one\n");
+
+  const auto result = runCommand(command_ + "-f 2>&1 >/dev/full");
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 1);
+  EXPECT_THAT(result.output, HasSubstr("mpf logs: standard output: "));
+}
+
 TEST_F(LogsTest, FollowsALogThatIsShortened) {
   append(std::string(std::size_t{3} << 16, '\n') + "last\n");
   mpf::test::Program logs({"/bin/sh", "-c", "exec " + command_ + "-n 1 -f >&2"});
