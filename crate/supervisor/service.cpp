@@ -140,7 +140,7 @@ void Service::terminate(EndReason reason, const std::string& why, std::int64_t n
 }
 
 void Service::requestStart() {
-  isRestartRequested_ = isStopRequested_ && isRunning();  // it is stopping
+  isRestartRequested_ = isRunning() && (isStopRequested_ || isRestartRequested_);
   isStopRequested_ = false;
   recentEndsNs_.clear();
   if (!isRunning()) state_ = ServiceState::waiting;

@@ -204,6 +204,18 @@ TEST_F(ServiceTest, AStartDuringAStopStartsAgain) {
   EXPECT_EQ(action(), Action::start);
 }
 
+TEST_F(ServiceTest, AStartDuringARestartDoesNotChangeIt) {
+  becomeReady();
+  service_.requestRestart(now_);
+  ASSERT_EQ(action(), Action::terminate);
+  service_.requestStart();
+
+  end(exited(2));
+
+  EXPECT_EQ(action(), Action::start);
+  EXPECT_EQ(service_.reason(), "restarted by request");
+}
+
 TEST_F(ServiceTest, IsRestartedWhenItDoesNotBecomeReady) {
   start();
   pass(5s);
