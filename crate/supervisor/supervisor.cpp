@@ -130,12 +130,14 @@ bool Supervisor::hasDependants(const Service& service) const {
   });
 }
 
-// Performs the action of each service.
+// Performs the action of each service. During the shutdown, none starts, and each that runs stops
+// after those that need it.
 void Supervisor::act() {
   const auto now = Clock::nowNs();
   for (const auto& member : members_) {
     auto& service = member->service;
-    if (isShuttingDown_ && !service.isStopRequested() && !hasDependants(service))
+    if (isShuttingDown_ && !service.isStopRequested() &&
+        (!service.isRunning() || !hasDependants(service)))
       service.requestStop(now);
     switch (service.action(areNeedsReady(service), now)) {
       case Action::start:

@@ -293,6 +293,23 @@ TEST_F(SupervisorTest, PrintsTheLinesOfItsProcesses) {
   EXPECT_EQ(runCommand(MPF " logs talker").output, "one\n");
 }
 
+TEST_F(SupervisorTest, AProcessThatDiesDuringTheShutdownIsNotStartedAgain) {
+  run(kServer +
+      "[[program]]\nname = \"user\"\nneeds = [\"int32\"]\n"
+      "command = [\"sh\", \"-c\", \"trap '' TERM; echo on; exec sleep 1000\"]\n");
+  ASSERT_NE(supervisor_->waitForLine("user | on"), "");
+  const auto user = pidOf("user");
+  supervisor_->signal(SIGTERM);
+  waitForState("user", "stopping");
+
+  ::kill(pidOf("int32"), SIGKILL);
+
+  waitForState("int32", "stopped");
+  ::kill(user, SIGKILL);
+  EXPECT_EQ(WEXITSTATUS(supervisor_->wait()), 0);
+  supervisor_.reset();
+}
+
 TEST_F(SupervisorTest, OneCrateHasOneSupervisor) {
   run(kServer);
 
