@@ -72,10 +72,12 @@ std::string CapsuleStore::add(const nlohmann::ordered_json& capsule) const {
 
 std::vector<std::string> CapsuleStore::list() const {
   std::vector<std::string> paths;
-  std::error_code absent;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_, absent)) {
+  std::error_code failure;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_, failure)) {
     if (entry.path().filename().string().ends_with(kEnding)) paths.push_back(entry.path().string());
   }
+  if (failure && failure.value() != ENOENT)
+    throwSystemError(failure.value(), "list", folder_.string());
   std::ranges::sort(paths);
   return paths;
 }

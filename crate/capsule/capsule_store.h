@@ -24,6 +24,7 @@ class CapsuleStore {
   //   throws  std::system_error
   std::string add(const nlohmann::ordered_json& capsule) const;  // NOLINT(modernize-use-nodiscard)
   // The paths of all capsules, in the order of add(); empty when there is no folder.
+  //   throws  std::system_error when the folder cannot be read
   [[nodiscard]] std::vector<std::string> list() const;
 
  private:

@@ -5,9 +5,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <memory>
+#include <system_error>
 #include <thread>
 
 #include <mpf/clock.h>
@@ -135,9 +137,20 @@ int stopCrate(const ControlArguments& arguments) {
   return 0;
 }
 
-std::vector<CrateFolder> lockedOf(std::vector<CrateFolder> folders) {
-  std::erase_if(folders, [](const auto& folder) { return !folder.isLocked(); });
-  return folders;
+// Those that run. The crate of another user, whose lock this one may not see, must not hide them:
+// its error is thrown only when no crate runs that this one sees.
+std::vector<CrateFolder> lockedOf(const std::vector<CrateFolder>& folders) {
+  std::vector<CrateFolder> locked;
+  std::exception_ptr hidden;
+  for (const auto& folder : folders) {
+    try {
+      if (folder.isLocked()) locked.push_back(folder);
+    } catch (const std::system_error&) {
+      hidden = std::current_exception();
+    }
+  }
+  if (locked.empty() && hidden) std::rethrow_exception(hidden);
+  return locked;
 }
 
 std::string namesOf(const std::vector<CrateFolder>& folders) {

@@ -115,12 +115,17 @@ std::optional<json> tryReport(const CrateFolder& folder) try {
   return std::nullopt;
 }
 
+// Whether processes of a crate run, or may run: tryReport() prints why that is not known.
+bool mayRun(const CrateFolder& folder) try {
+  return folder.isLocked() || !textOfUnsupervised(folder).empty();
+} catch (const std::exception&) {
+  return true;
+}
+
 std::vector<CrateFolder> chosenFolders(const std::string& name) {
   if (!name.empty()) return {CrateFolder::of(name)};
   auto folders = CrateFolder::all();
-  std::erase_if(folders, [](const auto& folder) {
-    return !folder.isLocked() && textOfUnsupervised(folder).empty();
-  });
+  std::erase_if(folders, [](const auto& folder) { return !mayRun(folder); });
   return folders;
 }
 

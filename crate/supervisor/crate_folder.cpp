@@ -49,10 +49,13 @@ std::filesystem::path CrateFolder::parent() {
 
 std::vector<CrateFolder> CrateFolder::all() {
   std::vector<CrateFolder> folders;
-  std::error_code absent;
-  for (const auto& entry : std::filesystem::directory_iterator(parent(), absent)) {
-    if (entry.is_directory(absent)) folders.emplace_back(entry.path());
+  std::error_code failure, gone;
+  const auto path = parent();
+  for (const auto& entry : std::filesystem::directory_iterator(path, failure)) {
+    if (entry.is_directory(gone)) folders.emplace_back(entry.path());
   }
+  if (failure && failure.value() != ENOENT)
+    throwSystemError(failure.value(), "list", path.string());
   std::ranges::sort(folders, {}, &CrateFolder::path);
   return folders;
 }
@@ -76,11 +79,14 @@ FileDescriptor CrateFolder::lock() const {
 }
 
 bool CrateFolder::isLocked() const {
-  const FileDescriptor opened(::open(file("lock").c_str(), O_RDWR | O_CLOEXEC));
+  const auto path = file("lock");
+  const FileDescriptor opened(::open(path.c_str(), O_RDWR | O_CLOEXEC));
+  if (!opened && errno == ENOENT) return false;
+  checkCall(opened.get(), "open", path);
   struct flock range{};
   range.l_type = F_WRLCK;
-  return opened.get() >= 0 && ::fcntl(opened.get(), F_OFD_GETLK, &range) == 0 &&
-         range.l_type != F_UNLCK;
+  checkCall(::fcntl(opened.get(), F_OFD_GETLK, &range), "fcntl(F_OFD_GETLK)", path);
+  return range.l_type != F_UNLCK;
 }
 
 }  // namespace mpf::crate

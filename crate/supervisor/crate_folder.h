@@ -33,6 +33,7 @@ class CrateFolder {
     return CrateFolder(parent() / crate);
   }
   // Of all crates of this user.
+  //   throws  std::system_error when the parent folder exists and cannot be read
   [[nodiscard]] static std::vector<CrateFolder> all();
 
   // Creates the folder, with access for this user only.
@@ -43,6 +44,7 @@ class CrateFolder {
   //   throws  std::runtime_error when another supervisor holds the lock
   [[nodiscard]] FileDescriptor lock() const;
   // Whether another process holds the lock.
+  //   throws  std::system_error when this user may not see it
   [[nodiscard]] bool isLocked() const;
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

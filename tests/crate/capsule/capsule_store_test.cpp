@@ -77,5 +77,12 @@ TEST(CapsuleStore, AFailedWriteLeavesNoFile) {
   EXPECT_TRUE(std::filesystem::is_empty(files.path()));
 }
 
+TEST(CapsuleStore, ThatCannotBeReadIsNotEmpty) {
+  const mpf::test::TemporaryFolder folder;
+  const CapsuleStore store(folder.write("file", ""));
+
+  EXPECT_THROW(static_cast<void>(store.list()), std::system_error);
+}
+
 }  // namespace
 }  // namespace mpf::crate::test

@@ -2,6 +2,7 @@
 // mpf ps: a crate that does not reply. mpf logs: which lines are shown, also of a log that is
 // shortened.
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -31,6 +32,25 @@ TEST_F(PsTest, ShowsTheOtherCratesWhenOneDoesNotReply) {
   const auto reports = runCommand(MPF " ps --json 2>/dev/null");
   EXPECT_EQ(WEXITSTATUS(reports.status), 1);
   EXPECT_EQ(nlohmann::json::parse(reports.output).at(0).at("crate"), "lab");
+}
+
+TEST_F(PsTest, NamesACrateThatItCannotSee) {
+  const auto hidden = CrateFolder::of("hidden");
+  hidden.create();
+  const auto lock = hidden.file("lock");
+  ASSERT_EQ(::symlink(lock.c_str(), lock.c_str()), 0);  // cannot be opened, also by root
+
+  const auto none = runCommand(MPF " ps 2>&1");
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto other = runCommand(MPF " ps 2>&1");
+
+  for (const auto& result : {none, other}) {
+    EXPECT_EQ(WEXITSTATUS(result.status), 1);
+    EXPECT_THAT(result.output, HasSubstr("mpf ps: open " + lock + ": "));
+  }
+  EXPECT_THAT(other.output, testing::ContainsRegex("int32 +ready"));
+  EXPECT_EQ(runCommand(MPF " restart int32 --wait 900").status, 0) << "the crate that it sees";
 }
 
 TEST_F(PsTest, SaysThatASupervisorIsStopped) {

@@ -86,6 +86,19 @@ TEST(CrateFolder, HasOneSupervisor) {
   EXPECT_NO_THROW(static_cast<void>(folder.lock()));
 }
 
+// As for a user who may not read the folder; this error concerns root, too.
+TEST(CrateFolder, ThatCannotBeSeenIsNotTakenForOneThatIsNotLocked) {
+  const TemporaryFolder parent;
+  const auto path = parent.write("file", "");
+  const CrateFolder folder(path);
+  ::setenv("MPF_CRATES", path.c_str(), 1);
+
+  EXPECT_THAT([&] { static_cast<void>(folder.isLocked()); },
+              ThrowsMessage<std::system_error>(HasSubstr("open " + path + "/lock: ")));
+  EXPECT_THAT([] { static_cast<void>(CrateFolder::all()); },
+              ThrowsMessage<std::system_error>(HasSubstr("list " + path + ": ")));
+}
+
 TEST(CrateFolder, AllAreListed) {
   const TemporaryFolder parent;
   ::setenv("MPF_CRATES", parent.path().c_str(), 1);
