@@ -15,6 +15,7 @@
 #include <mpf/clock.h>
 
 #include "base/print_error.h"
+#include "base/printable.h"
 #include "base/run_main.h"
 #include "crate/commands/commands.h"
 #include "crate/supervisor/control_protocol.h"
@@ -59,7 +60,7 @@ void waitFor(const CrateFolder& folder, const ControlArguments& arguments, const
     const auto state = process.value("state", "gone");
     const auto isNew = process.value("pid", 0) != pidBefore;
     if (state == "stopped" || state == "gone" || (!isStop && isNew && isReady(process))) {
-      fmt::print("{} is {}\n", arguments.process, state);
+      fmt::print("{} is {}\n", printable(arguments.process), state);
       return;
     }
     if (state == "failed")
@@ -85,7 +86,8 @@ void printDependants(const json& report, const std::string& name) {
       names.push_back(one.at("name"));
   }
   if (!names.empty())
-    fmt::print("processes that need {} continue: {}\n", name, fmt::join(names, ", "));
+    fmt::print("processes that need {} continue: {}\n", printable(name),
+               printable(fmt::to_string(fmt::join(names, ", "))));
 }
 
 int controlProcess(const std::string& what, const ControlArguments& arguments) {

@@ -58,23 +58,26 @@ std::string stateOf(const json& process) {
   return process.value("isStalled", false) ? "stalled" : process.at("state").get<std::string>();
 }
 
+std::string printableOf(const json& object, const char* key) {
+  return printable(object.at(key).get<std::string>());
+}
+
 void printCrate(const json& crate) {
   const auto supervisor = crate.at("pid").get<int>();
-  fmt::print("crate {}, {}, {}\n", crate.at("crate").get<std::string>(),
-             crate.at("file").get<std::string>(),
-             supervisor != 0 ? fmt::format("supervisor {}", supervisor)
-                             : crate.at("problem").get<std::string>());
+  fmt::print(
+      "crate {}, {}, {}\n", printableOf(crate, "crate"), printableOf(crate, "file"),
+      supervisor != 0 ? fmt::format("supervisor {}", supervisor) : printableOf(crate, "problem"));
   Table table({"PROCESS", "STATE", ">PID", ">RESTARTS", ">UP", ">CPU", ">MEMORY", "LAST END"});
   for (const auto& process : crate.at("processes")) {
     const auto pid = process.at("pid").get<int>();
     const auto isRunning = pid != 0;
     table.add(
-        {process.at("name"), stateOf(process), isRunning ? fmt::to_string(pid) : "-",
+        {printableOf(process, "name"), stateOf(process), isRunning ? fmt::to_string(pid) : "-",
          fmt::to_string(process.at("restarts").get<int>()),
          isRunning ? durationText(process.at("upS").get<double>() * 1e9) : "-",
          isRunning ? durationText(process.at("cpuS").get<double>() * 1e9) : "-",
          isRunning ? fmt::format("{:.1f} MB", process.at("memoryBytes").get<double>() / 1e6) : "-",
-         process.at("reason")});
+         printableOf(process, "reason")});
   }
   fmt::print("{}", table.fitted("  "));
 }

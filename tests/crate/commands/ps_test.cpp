@@ -53,6 +53,17 @@ TEST_F(PsTest, NamesACrateThatItCannotSee) {
   EXPECT_EQ(runCommand(MPF " restart int32 --wait 900").status, 0) << "the crate that it sees";
 }
 
+TEST_F(PsTest, PrintsAPathWithoutControlCharacters) {
+  std::filesystem::create_directory(files_.path() / "a\x1b[2J");
+  start({MPF, "run", files_.write("a\x1b[2J/lab.toml", kServer)});
+
+  const auto result = runCommand(MPF " ps");
+
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.output, HasSubstr("/a\\x1b[2J/lab.toml, supervisor "));
+  EXPECT_THAT(result.output, testing::Not(HasSubstr("\x1b")));
+}
+
 TEST_F(PsTest, SaysThatASupervisorIsStopped) {
   run(kServer);
 
