@@ -164,4 +164,11 @@ std::string shellText(const ProcessPlan& plan) {
   return text;
 }
 
+std::string contextText(const ProcessPlan& plan) {
+  auto text = fmt::format("user={} folder={}", quoted(plan.user), quoted(plan.workingFolder));
+  for (const auto& [file, number] : plan.inputs)
+    text += fmt::format(" {}={}", quoted(file), number);
+  return text;
+}
+
 }  // namespace mpf::crate

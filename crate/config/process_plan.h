@@ -44,5 +44,7 @@ struct ProcessPlan {
 // The command line as a shell would read it, with its environment: "A=b mpf-x 'an argument'"; empty
 // for the plan of a process that is no longer in the crate.
 [[nodiscard]] std::string shellText(const ProcessPlan& plan);
+// What else its process depends on: "user=U folder=F FILE=NUMBER", with the `inputs`.
+[[nodiscard]] std::string contextText(const ProcessPlan& plan);
 
 }  // namespace mpf::crate

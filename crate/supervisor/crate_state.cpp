@@ -25,7 +25,8 @@ CrateState CrateState::read(const std::string& path) try {
   state.file = json.at("crate");
   for (const auto& one : json.at("processes")) {
     state.processes.push_back({one.at("name"), one.at("pid"), one.at("startTicks"),
-                               one.at("restarts"), one.at("command"), one.at("isStopRequested")});
+                               one.at("restarts"), one.at("command"), one.at("isStopRequested"),
+                               one.value("context", "")});
   }
   return state;
 } catch (const std::system_error& error) {
@@ -52,7 +53,8 @@ void CrateState::write(const std::string& path) const {
                    {"startTicks", one.startTicks},
                    {"restarts", one.restarts},
                    {"command", one.command},
-                   {"isStopRequested", one.isStopRequested}});
+                   {"isStopRequested", one.isStopRequested},
+                   {"context", one.context}});
   }
   const nlohmann::json json{{"boot", bootId()}, {"crate", file}, {"processes", all}};
   const auto fresh = path + ".new";

@@ -24,6 +24,8 @@ struct RecordedProcess {
   int restarts = 0;
   std::string command;  // as shellText() writes it: a process with another one is restarted
   bool isStopRequested = false;
+  // As contextText() writes it, with the same effect; empty in a record of an older version.
+  std::string context;
 };
 
 struct CrateState {

@@ -34,6 +34,11 @@ void print(const std::vector<LogLimiter::Line>& lines) {
   for (const auto& line : lines) printError("mpf run: {}\n", line.text);
 }
 
+bool hasChanged(const RecordedProcess& process, const ProcessPlan& plan) {
+  return process.command != shellText(plan) ||
+         (!process.context.empty() && process.context != contextText(plan));
+}
+
 }  // namespace
 
 Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
@@ -67,7 +72,7 @@ void Supervisor::run() {
 }
 
 // Each process that an earlier supervisor has started and that still runs is supervised again. One
-// that the crate has no more, or with another command line, is ended.
+// that the crate has no more, or with another command line or changed files, is ended.
 void Supervisor::takeOver() {
   for (const auto& recorded : CrateState::read(folder_.file("state.json")).processes) {
     auto* member = find(recorded.name);
@@ -93,7 +98,7 @@ void Supervisor::takeOver() {
     capsuleWriter_.watch(service);
     log(service, fmt::format("taken over, pid {}", recorded.pid));
     if (member->isRemoved || recorded.isStopRequested) service.requestStop(Clock::nowNs());
-    else if (recorded.command != shellText(service.plan())) service.requestRestart(Clock::nowNs());
+    else if (hasChanged(recorded, service.plan())) service.requestRestart(Clock::nowNs());
   }
 }
 
@@ -303,10 +308,10 @@ void Supervisor::record() const {
   state.file = crate_.file;
   for (const auto& member : members_) {
     const auto& service = member->service;
-    state.processes.push_back(
-        {service.plan().name, service.pid(), service.startTicks(), service.restarts(),
-         shellText(service.plan()),
-         service.isStopRequested() && !isShuttingDown_ && !member->isRemoved});
+    state.processes.push_back({service.plan().name, service.pid(), service.startTicks(),
+                               service.restarts(), shellText(service.plan()),
+                               service.isStopRequested() && !isShuttingDown_ && !member->isRemoved,
+                               contextText(service.plan())});
   }
   state.write(folder_.file("state.json"));
 }

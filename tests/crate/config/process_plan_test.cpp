@@ -121,6 +121,15 @@ TEST(ShellText, QuotesWhatAShellWouldChange) {
   EXPECT_EQ(shellText(plan), R"(A='x y' mpf-x 'a[0]' 'it'\''s' '' --b=c,d)");
 }
 
+TEST(ContextText, HasWhatTheCommandLineDoesNotSay) {
+  ProcessPlan plan;
+  plan.user = "mpf";
+  plan.workingFolder = "/a b";
+  plan.inputs = {{"a.db", 7}};
+
+  EXPECT_EQ(contextText(plan), "user=mpf folder='/a b' a.db=7");
+}
+
 TEST(ShellText, APlanWithoutACommandHasNoText) { EXPECT_EQ(shellText(ProcessPlan()), ""); }
 
 }  // namespace

@@ -15,7 +15,7 @@ class CrateStateTest : public testing::Test {
  protected:
   CrateStateTest() {
     state_.file = "/etc/lab.toml";
-    state_.processes.push_back({"dac", 12, 345, 6, "mpf-x 'a b'", true});
+    state_.processes.push_back({"dac", 12, 345, 6, "mpf-x 'a b'", true, "user=''"});
     state_.write(path_);
   }
   mpf::test::TemporaryFolder folder_;
@@ -35,6 +35,18 @@ TEST_F(CrateStateTest, IsReadAsItWasWritten) {
   EXPECT_EQ(one.restarts, 6);
   EXPECT_EQ(one.command, "mpf-x 'a b'");
   EXPECT_TRUE(one.isStopRequested);
+  EXPECT_EQ(one.context, "user=''");
+}
+
+TEST_F(CrateStateTest, OfAnOlderVersionHasNoContext) {
+  auto text = readWholeFile(path_);
+  const auto at = text.find("\"context\"");
+  text.replace(at, 9, "\"other\"");
+
+  const auto read = CrateState::read(folder_.write("other", text));
+
+  ASSERT_EQ(read.processes.size(), 1U);
+  EXPECT_EQ(read.processes[0].context, "");
 }
 
 TEST_F(CrateStateTest, OfAnotherBootCountsAsEmpty) {

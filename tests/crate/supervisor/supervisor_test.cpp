@@ -192,6 +192,25 @@ TEST_F(SupervisorTest, ANewSupervisorTakesOverWhatRuns) {
   EXPECT_TRUE(isReplying("Int32"));
 }
 
+// A router reads its file only when it starts.
+TEST_F(SupervisorTest, ATakenOverProcessWithAChangedFileIsRestarted) {
+  const std::string listen = "[[listen]]\naddress = \"127.0.0.1:0\"\nsecurity = \"plain\"\n";
+  static_cast<void>(files_.write("router.toml", listen + "[[serve]]\nlocation = 1\nlocal = 0\n"));
+  run("[[router]]\nfile = \"router.toml\"\n");
+  waitForState("router", "ready");
+  const auto before = pidOf("router");
+  killSupervisor();
+  run();
+  waitForState("router", "ready");
+  ASSERT_EQ(pidOf("router"), before);
+
+  killSupervisor();
+  static_cast<void>(files_.write("router.toml", listen + "[[serve]]\nlocation = 2\nlocal = 0\n"));
+  run();
+
+  waitForNew("router", before);
+}
+
 TEST_F(SupervisorTest, TakesOverAndSeesEndsWithoutPidfds) {
   run(kServer);
   waitForState("int32", "ready");
