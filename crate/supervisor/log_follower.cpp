@@ -11,6 +11,7 @@
 #include <cctype>
 #include <fmt/format.h>
 #include <functional>
+#include <system_error>
 #include <utility>
 
 #include "base/printable.h"
@@ -64,13 +65,19 @@ LogFollower::LogFollower(bool hasColour, std::uint64_t maxBytes)
 
 void LogFollower::add(const std::string& name, const std::string& path) {
   if (logs_.contains(name)) return;
+  auto log = open(path);
+  log.offset = ::lseek(log.file.get(), 0, SEEK_END);
+  logs_.emplace(name, std::move(log));
+}
+
+LogFollower::Log LogFollower::open(const std::string& path) const {
   Log log;
   log.path = path;
   log.file = FileDescriptor(
       checkCall(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "open", path));
-  log.offset = ::lseek(log.file.get(), 0, SEEK_END);
-  checkCall(::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
-  logs_.emplace(name, std::move(log));
+  log.watch = checkCall(::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY),
+                        "inotify_add_watch", path);
+  return log;
 }
 
 std::string LogFollower::takeLines() {
@@ -79,12 +86,35 @@ std::string LogFollower::takeLines() {
   std::string text;
   hasMore_ = false;
   for (auto& [name, log] : logs_) readNew(name, log, text);
-  limit();
+  for (auto& [name, log] : logs_) limit(log);
   return text;
 }
 
-void LogFollower::limit() {
-  for (auto& [name, log] : logs_) limit(log);
+void LogFollower::maintain() {
+  for (auto& [name, log] : logs_) {
+    if (isReplaced(log)) tryReopen(log);
+    limit(log);
+  }
+}
+
+bool LogFollower::isReplaced(const Log& log) {
+  struct stat opened{}, named{};
+  return ::fstat(log.file.get(), &opened) == 0 && ::stat(log.path.c_str(), &named) == 0 &&
+         (opened.st_ino != named.st_ino || opened.st_dev != named.st_dev);
+}
+
+// Takes the rest of the old file, and follows the new one from its beginning. Without a free
+// descriptor, the next call tries again.
+void LogFollower::tryReopen(Log& log) try {
+  auto fresh = open(log.path);
+  readBytes(log);
+  ::inotify_rm_watch(events_.get(), log.watch);
+  log.file = std::move(fresh.file);
+  log.watch = fresh.watch;
+  log.offset = 0;
+  hasMore_ = true;
+} catch (const std::system_error&) {
+  return;
 }
 
 std::string LogFollower::prefix(const std::string& name) const {
@@ -93,7 +123,7 @@ std::string LogFollower::prefix(const std::string& name) const {
   return fmt::format("\x1b[{}m{}\x1b[0m | ", colour, name);
 }
 
-void LogFollower::readNew(const std::string& name, Log& log, std::string& to) {
+void LogFollower::readBytes(Log& log) {
   std::array<char, 65536> bytes{};
   struct stat status{};
   if (::fstat(log.file.get(), &status) == 0 && status.st_size < log.offset) log.offset = 0;
@@ -105,6 +135,10 @@ void LogFollower::readNew(const std::string& name, Log& log, std::string& to) {
     log.partial.append(bytes.data(), static_cast<std::size_t>(length));
   }
   hasMore_ = hasMore_ || log.offset >= enough;
+}
+
+void LogFollower::readNew(const std::string& name, Log& log, std::string& to) {
+  readBytes(log);
   const auto folded = takeWhole(log);
   for (std::size_t begin = 0; begin < folded.size();) {
     const auto end = folded.find('\n', begin);

@@ -56,18 +56,24 @@ class LogFollower {
   // Returns new lines, at most about a megabyte of each log; hasMore() tells whether others follow.
   // A line that is longer than 64 KiB comes in parts.
   [[nodiscard]] std::string takeLines();
-  // Shortens logs that are too long, as takeLines() does, but takes no lines.
-  void limit();
+  // Shortens logs that are too long, as takeLines() does, but takes no lines; follows the new file
+  // of a log that was removed or renamed.
+  void maintain();
   [[nodiscard]] bool hasMore() const noexcept { return hasMore_; }
 
  private:
   struct Log {
     std::string path;
     FileDescriptor file;
+    int watch = -1;
     std::int64_t offset = 0;
     std::string partial;  // a line without its end
     LineFolder folder;
   };
+  [[nodiscard]] Log open(const std::string& path) const;
+  [[nodiscard]] static bool isReplaced(const Log& log);
+  void tryReopen(Log& log);
+  void readBytes(Log& log);
   void readNew(const std::string& name, Log& log, std::string& to);
   static std::string takeWhole(Log& log);
   void limit(Log& log) const;

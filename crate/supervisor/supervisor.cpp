@@ -262,7 +262,7 @@ void Supervisor::look() {
     for (auto& [backplane, watch] : watches_) watch.look();
     capsuleWriter_.look();
   });
-  logs_.limit();
+  logs_.maintain();
   if (!isRecorded_) tryRecord();
   const auto now = Clock::nowNs();
   print(problems_.takeDue(now));

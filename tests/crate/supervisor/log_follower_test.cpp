@@ -2,9 +2,11 @@
 // LogFollower: new lines with the names of their processes, storms, and logs that are too long.
 #include "crate/supervisor/log_follower.h"
 
+#include <poll.h>
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -76,6 +78,29 @@ TEST_F(LogFollowerTest, ALogThatCouldNotBeOpenedCanBeAddedLater) {
   append(path_, "one\n");
 
   EXPECT_EQ(follower.takeLines(), "dac | one\n");
+}
+
+TEST_F(LogFollowerTest, FollowsTheNewFileOfALogThatWasRemoved) {
+  LogFollower follower(false, 1u << 20);
+  follower.add("dac", path_);
+  append(path_, "old\n");
+  std::filesystem::remove(path_);
+  follower.maintain();
+  append(path_, "new\n");
+
+  follower.maintain();
+
+  EXPECT_TRUE(follower.hasMore());
+  EXPECT_EQ(follower.takeLines(), "dac | old\ndac | new\n");
+  append(path_, "next\n");
+  pollfd poll{follower.descriptor(), POLLIN, 0};
+  EXPECT_EQ(::poll(&poll, 1, 0), 1);
+  EXPECT_EQ(follower.takeLines(), "dac | next\n");
+  append(path_, std::string(std::size_t{3} << 20, '\n'));
+  follower.maintain();
+  struct stat status{};
+  ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+  EXPECT_LT(status.st_blocks * 512, 2 << 20);
 }
 
 TEST_F(LogFollowerTest, ReturnsALongLogInParts) {
