@@ -30,7 +30,8 @@ class CrateSource {
   [[nodiscard]] Crate read() const;
   // The same, and checks that this host can start the processes of a crate file.
   [[nodiscard]] Crate check() const;
-  // The same, and writes the commands for the IOC of a startup file into the folder of the crate.
+  // The same, and writes the commands for the IOC of a startup file into the folder of the crate,
+  // which the caller has locked.
   [[nodiscard]] Crate prepare() const;
   // Reads a startup file.
   //   iocFile        where the commands for its IOC will be

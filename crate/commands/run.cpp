@@ -62,8 +62,10 @@ int runCrate(const RunArguments& arguments) {
   }
   if (arguments.source.isStartupFile())
     printDiagnostics(arguments.source.readStartup("", false).diagnostics, false);
-  const auto crate = arguments.source.prepare();
-  const auto load = [source = arguments.source, first = std::optional(crate)]() mutable {
+  const auto crate = arguments.source.check();
+  // What a startup file prepares is written only when the supervisor has locked the folder.
+  auto first = arguments.source.isStartupFile() ? std::nullopt : std::optional(crate);
+  const auto load = [source = arguments.source, first = std::move(first)]() mutable {
     return first ? *std::exchange(first, std::nullopt) : source.prepare();
   };
   Supervisor(folderOf(crate), load).run();

@@ -34,6 +34,11 @@ void print(const std::vector<LogLimiter::Line>& lines) {
   for (const auto& line : lines) printError("mpf run: {}\n", line.text);
 }
 
+FileDescriptor createLocked(const CrateFolder& folder) {
+  folder.create();
+  return folder.lock();
+}
+
 bool hasChanged(const RecordedProcess& process, const ProcessPlan& plan) {
   return process.command != shellText(plan) ||
          (!process.context.empty() && process.context != contextText(plan));
@@ -43,13 +48,12 @@ bool hasChanged(const RecordedProcess& process, const ProcessPlan& plan) {
 
 Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
     : folder_(std::move(folder)),
+      lock_(createLocked(folder_)),
       load_(std::move(load)),
       crate_(load_()),
       logs_(::isatty(STDERR_FILENO) != 0, crate_.maxLogBytes),
       capsuleWriter_(folder_, crate_) {
   ::signal(SIGPIPE, SIG_IGN);  // stderr may be a pipe whose reader Ctrl-C has ended
-  folder_.create();
-  lock_ = folder_.lock();
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // reaps what the processes leave behind
   control_.listen(folder_);
   static_cast<void>(apply(planProcesses(crate_, folder_.path().string())));

@@ -36,7 +36,7 @@ namespace mpf::crate {
 class Supervisor {
  public:
   // Locks the folder, and takes over the processes that an earlier supervisor has left.
-  //   load    reads the crate again; called at the start and for each reload
+  //   load    reads the crate; called at the start, when the folder is locked, and for each reload
   //   throws  ConfigError, std::runtime_error, std::system_error
   Supervisor(CrateFolder folder, std::function<Crate()> load);
   Supervisor(const Supervisor&) = delete;
@@ -98,9 +98,9 @@ class Supervisor {
 
   ErrorQueue errors_;  // first, because constructors and destructors print, too
   CrateFolder folder_;
+  FileDescriptor lock_;
   std::function<Crate()> load_;
   Crate crate_;
-  FileDescriptor lock_;
   SignalQueue signals_{SIGINT, SIGTERM, SIGHUP, SIGCHLD};
   std::vector<std::unique_ptr<Member>> members_;  // each after those that it needs
   std::map<std::string, ServerWatch> watches_;  // by backplane

@@ -70,6 +70,18 @@ TEST_F(RunTest, TheExamplesInANewCrateAreRight) {
   EXPECT_THAT(result.output, HasSubstr("processes, no error")) << text;
 }
 
+TEST_F(RunTest, ARefusedRunOfAStartupFileChangesNothing) {
+  start({MPF, "run", "--name", "lab", files_.write("st.cmd", "iocInit\n")});
+  const auto before = readWholeFile(folder().file("ioc.cmd"));
+  static_cast<void>(files_.write("other.cmd", "iocInit\nmrr\n"));
+
+  const auto result = mpf("run --name lab other.cmd");
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 1);
+  EXPECT_THAT(result.output, HasSubstr("the crate \"lab\" is already running"));
+  EXPECT_EQ(readWholeFile(folder().file("ioc.cmd")), before);
+}
+
 // ---- errors that this host, or a program, finds
 
 constexpr const char* kWrong = R"(backplane = "a b"
