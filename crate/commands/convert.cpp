@@ -19,10 +19,13 @@ struct ConvertArguments {
   std::string folder = ".";
 };
 
-void writeFile(const std::filesystem::path& path, const std::string& text) {
+void checkIsAbsent(const std::filesystem::path& path) {
   if (std::filesystem::exists(path))
     throw std::runtime_error(
         fmt::format("{} exists; choose another --output or --name, or remove it", path.string()));
+}
+
+void writeFile(const std::filesystem::path& path, const std::string& text) {
   OutputFile output(path.string());
   output.write(text);
   output.close();
@@ -41,6 +44,8 @@ int convert(const ConvertArguments& arguments) {
   printDiagnostics(startup.diagnostics, true);
   const std::filesystem::path folder(arguments.folder);
   const auto file = folder / (name + ".toml");
+  if (!startup.iocText.empty()) checkIsAbsent(folder / iocFile);
+  checkIsAbsent(file);
   if (!startup.iocText.empty()) writeFile(folder / iocFile, startup.iocText);
   writeFile(file, writeCrate(startup.crate,
                              fmt::format("Crate {0}, converted from {1} by `mpf convert`. Each "

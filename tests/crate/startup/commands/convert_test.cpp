@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <sstream>
@@ -53,6 +54,15 @@ TEST_F(ConvertTest, OverwritesNothing) {
   const auto again = mpf("convert st.cmd --name lab");
   EXPECT_NE(again.status, 0);
   EXPECT_THAT(again.output, HasSubstr("lab.toml exists; choose another"));
+}
+
+TEST_F(ConvertTest, WritesBothFilesOrNone) {
+  static_cast<void>(folder_.write("ioc.cmd", "iocInit\n"));
+  static_cast<void>(folder_.write("lab.toml", ""));
+
+  EXPECT_EQ(WEXITSTATUS(mpf("convert ioc.cmd --name lab").status), 1);
+
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("lab-ioc.cmd")));
 }
 
 TEST_F(ConvertTest, RefusesACrateFile) {
