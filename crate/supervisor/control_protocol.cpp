@@ -13,6 +13,7 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <stdexcept>
+#include <thread>
 
 #include <mpf/clock.h>
 
@@ -23,7 +24,7 @@
 namespace mpf::crate {
 namespace {
 
-constexpr std::chrono::milliseconds kLookAtSupervisorEvery{500};
+constexpr std::chrono::milliseconds kLookAtSupervisorEvery{500}, kConnectEvery{20};
 
 // The address of the socket. The path goes through a descriptor of the folder, because the path of
 // a socket has at most 107 bytes, and that of the folder may be longer.
@@ -54,13 +55,29 @@ pid_t peerOf(int socket) {
 }
 
 // A stopped supervisor replies only after somebody has continued it.
-void checkNotStopped(int socket, const std::string& crate) {
-  const auto pid = peerOf(socket);
+void checkNotStopped(pid_t pid, const std::string& crate) {
   const auto stat = ProcessStat::tryRead(pid);
   if (!stat || !isStopped(stat->state())) return;
   throw std::runtime_error(fmt::format(
       "the supervisor of the crate \"{}\", process {}, is stopped; `kill -CONT {}` continues it",
       crate, pid, pid));
+}
+
+void checkDeadline(const Deadline& deadline, const std::string& crate) {
+  if (deadline.hasPassed())
+    throw std::runtime_error(fmt::format(
+        "the supervisor of the crate \"{}\" does not reply; try again, or see its log", crate));
+}
+
+// Waits while the queue of the socket is full: the supervisor is busy or stopped.
+void connectTo(int socket, const CrateFolder& folder, const Deadline& deadline) {
+  const SocketAddress address(folder);
+  while (::connect(socket, address.get(), sizeof address.address) != 0) {
+    if (errno != EAGAIN) throwSystemError(errno, "connect", folder.file("control"));
+    checkNotStopped(folder.lockHolder().value_or(0), folder.name());
+    checkDeadline(deadline, folder.name());
+    std::this_thread::sleep_for(kConnectEvery);
+  }
 }
 
 void waitForReply(int socket, const Deadline& deadline, const std::string& crate) {
@@ -70,10 +87,8 @@ void waitForReply(int socket, const Deadline& deadline, const std::string& crate
     const auto wait = std::min(left, kLookAtSupervisorEvery);
     if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(wait.count())); }) > 0)
       return;
-    checkNotStopped(socket, crate);
-    if (deadline.hasPassed())
-      throw std::runtime_error(fmt::format(
-          "the supervisor of the crate \"{}\" does not reply; try again, or see its log", crate));
+    checkNotStopped(peerOf(socket), crate);
+    checkDeadline(deadline, crate);
   }
 }
 
@@ -105,15 +120,13 @@ FileDescriptor listenForControl(const CrateFolder& folder) {
 nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& request,
                              std::chrono::milliseconds patience) try {
   const auto socket = makeSocket();
-  const SocketAddress address(folder);
-  checkCall(::connect(socket.get(), address.get(), sizeof address.address), "connect",
-            folder.file("control"));
+  const auto deadline = Deadline::after(patience);
+  connectTo(socket.get(), folder, deadline);
   const auto text = request.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   // EPIPE: the supervisor has refused us already; its reply says why.
   if (::send(socket.get(), text.data(), text.size(), MSG_NOSIGNAL) < 0 && errno != EPIPE)
     throwSystemError(errno, "send", folder.file("control"));
-  auto reply =
-      nlohmann::json::parse(readLine(socket.get(), Deadline::after(patience), folder.name()));
+  auto reply = nlohmann::json::parse(readLine(socket.get(), deadline, folder.name()));
   if (reply.contains("fileErrors")) throw ConfigError(reply.at("fileErrors").get<std::string>());
   if (reply.contains("error")) throw std::runtime_error(reply.at("error").get<std::string>());
   return reply;

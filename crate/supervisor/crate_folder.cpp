@@ -78,15 +78,15 @@ FileDescriptor CrateFolder::lock() const {
   return opened;
 }
 
-bool CrateFolder::isLocked() const {
+std::optional<pid_t> CrateFolder::lockHolder() const {
   const auto path = file("lock");
   const FileDescriptor opened(::open(path.c_str(), O_RDWR | O_CLOEXEC));
-  if (!opened && errno == ENOENT) return false;
+  if (!opened && errno == ENOENT) return std::nullopt;
   checkCall(opened.get(), "open", path);
   struct flock range{};
   range.l_type = F_WRLCK;
   checkCall(::fcntl(opened.get(), F_OFD_GETLK, &range), "fcntl(F_OFD_GETLK)", path);
-  return range.l_type != F_UNLCK;
+  return range.l_type == F_UNLCK ? std::nullopt : std::optional(range.l_pid);
 }
 
 }  // namespace mpf::crate

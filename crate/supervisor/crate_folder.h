@@ -15,7 +15,10 @@
 // Crash    the lock ends with the process that holds it.
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,7 +48,9 @@ class CrateFolder {
   [[nodiscard]] FileDescriptor lock() const;
   // Whether another process holds the lock.
   //   throws  std::system_error when this user may not see it
-  [[nodiscard]] bool isLocked() const;
+  [[nodiscard]] bool isLocked() const { return lockHolder().has_value(); }
+  // The process that holds the lock; 0 or below if this one does not see it.
+  [[nodiscard]] std::optional<pid_t> lockHolder() const;
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] std::string name() const { return path_.filename().string(); }

@@ -2,15 +2,23 @@
 // askSupervisor(): replies, errors, and supervisors that are absent, silent or invalid.
 #include "crate/supervisor/control_protocol.h"
 
+#include <fcntl.h>
 #include <poll.h>
+#include <signal.h>
 #include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <fmt/format.h>
+#include <future>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <thread>
+#include <vector>
 
+#include "base/system_call.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/watchdog.h"
 
@@ -39,6 +47,20 @@ class ControlProtocolTest : public testing::Test {
       EXPECT_EQ(::write(caller.get(), reply.data(), reply.size()),
                 static_cast<ssize_t>(reply.size()));
     });
+  }
+  // Callers until the queue of the socket is full; the last one is not connected.
+  std::vector<FileDescriptor> fillQueue() {
+    const FileDescriptor opened(::open(folder_.path().c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    const auto path = fmt::format("/proc/self/fd/{}/control", opened.get());
+    sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+    path.copy(address.sun_path, sizeof address.sun_path - 1);
+    std::vector<FileDescriptor> callers;
+    do {
+      callers.emplace_back(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    } while (::connect(callers.back().get(), reinterpret_cast<sockaddr*>(&address),
+                       sizeof address) == 0);
+    EXPECT_EQ(errno, EAGAIN);
+    return callers;
   }
   const mpf::test::Watchdog watchdog_{"ControlProtocol"};
   mpf::test::TemporaryFolder parent_;
@@ -90,6 +112,39 @@ TEST_F(ControlProtocolTest, DoesNotWaitForeverForAReply) {
   EXPECT_THAT([&] { askSupervisor(folder_, {{"do", "ps"}}, 10ms); },
               ThrowsMessage<std::runtime_error>(
                   HasSubstr("the supervisor of the crate \"lab\" does not reply")));
+}
+
+TEST_F(ControlProtocolTest, WaitsWhileASupervisorHasManyCallers) {
+  const auto listening = listenForControl(folder_);
+  const auto callers = fillQueue();
+  EXPECT_THAT([&] { askSupervisor(folder_, {{"do", "ps"}}, 10ms); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("does not reply")));
+
+  auto reply = std::async(std::launch::async, [&] { return askSupervisor(folder_, {}); });
+  for (std::size_t i = 1; i < callers.size(); ++i)
+    FileDescriptor(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC)).reset();
+  auto server = serve(listening, "{\"a\": 1}\n");
+
+  EXPECT_EQ(reply.get().at("a"), 1);
+}
+
+TEST_F(ControlProtocolTest, SaysThatASupervisorWithManyCallersIsStopped) {
+  const auto listening = listenForControl(folder_);
+  const auto callers = fillQueue();
+  const auto supervisor = checkCall(::fork(), "fork");
+  if (supervisor == 0) {
+    const auto lock = folder_.lock();
+    ::raise(SIGSTOP);
+    ::_exit(0);
+  }
+  ::waitpid(supervisor, nullptr, WUNTRACED);
+
+  EXPECT_THAT([&] { askSupervisor(folder_, {{"do", "ps"}}); },
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr(fmt::format("process {}, is stopped; `kill -CONT ", supervisor))));
+
+  ::kill(supervisor, SIGKILL);
+  ::waitpid(supervisor, nullptr, 0);
 }
 
 TEST_F(ControlProtocolTest, ReportsAnInvalidReply) {
