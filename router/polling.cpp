@@ -9,6 +9,8 @@
 
 #include <mpf/clock.h>
 
+#include "router/after_ready_tasks.h"
+
 namespace mpf::router {
 namespace {
 
@@ -56,13 +58,14 @@ void Polling::drop(Polled& window) {
 }
 
 // afterDelay(0): the event loop first runs all tasks that are ready and looks at its descriptors.
-// evalLast(): the turn runs after the handlers of what the descriptors have brought. Of the tasks
-// of evalLast() the newest one runs first: writes to the lines, which are newer, run before the
-// turn.
+// afterReadyTasks(): the turn runs after the handlers of what the descriptors have brought. Of the
+// calls of afterReadyTasks() the newest one resolves first: writes to the lines, which are newer,
+// run before the turn.
 kj::Promise<void> Polling::nextTurn() {
-  return port_.getTimer().afterDelay(0 * kj::NANOSECONDS).then([this] {
-    return kj::evalLast([this] { return loop(); });
-  });
+  auto& timer = port_.getTimer();
+  return timer.afterDelay(0 * kj::NANOSECONDS)
+      .then([&timer] { return afterReadyTasks(timer); })
+      .then([this] { return loop(); });
 }
 
 kj::Promise<void> Polling::loop() {

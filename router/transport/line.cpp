@@ -7,6 +7,7 @@
 
 #include <mpf/clock.h>
 
+#include "router/after_ready_tasks.h"
 #include "router/transport/kj_text.h"
 #include "router/transport/tls.h"
 #include "shm/histogram.h"
@@ -279,16 +280,16 @@ void Line::send(const PlainItems& items) {
   for (std::size_t at = 0; at < items.run.size(); ++at) queue_.reject(items[at]);
 }
 
-// Writes after all tasks that are ready now, so that what they send shares the frame.
+// Writes after the tasks that are ready now, so that what they send shares the frame.
 template <class... Outgoing>
 void Line::enqueue(Outgoing&&... outgoing) {
   const bool wasIdle = queue_.isIdle();
   queue_.push(std::forward<Outgoing>(outgoing)...);
   if (!wasIdle) return;
   writes_ =
-      kj::evalLast([this] { return writeAll(); }).eagerlyEvaluate([this](kj::Exception&& error) {
-        onWriteFailure(tlsProblem(error));
-      });
+      afterReadyTasks(timer_)
+          .then([this] { return writeAll(); })
+          .eagerlyEvaluate([this](kj::Exception&& error) { onWriteFailure(tlsProblem(error)); });
 }
 
 kj::Promise<void> Line::writeAll() {

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/router/busy_tasks.h"
 #include "tests/support/replaced_yield.h"
 #include "tests/support/watchdog.h"
 
@@ -92,6 +93,17 @@ TEST_F(PollingTest, HandlesEventsOfDescriptors) {
   read.wait(io_.waitScope);
 
   EXPECT_EQ(byte, 'x');
+}
+
+// As while many peers send all the time.
+TEST_F(PollingTest, PollsThoughOtherTasksAreAlwaysReady) {
+  Window window;
+  while (!window.isPolled) polling_.add(window);
+  const BusyTasks busy(io_);
+
+  while (window.polls == 0) wait();
+
+  while (polling_.isPolling()) wait();
 }
 
 // As the write of a message that led to the traffic.

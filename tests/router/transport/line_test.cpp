@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Line: its start and its end, and the messages that share a frame.
+#include "tests/router/busy_tasks.h"
 #include "tests/router/transport/line_fixture.h"
 
 namespace mpf::test {
@@ -216,6 +217,16 @@ TEST_F(LineTest, MessagesQueuedDuringAWriteShareTheNextFrame) {
   ASSERT_THAT(items, SizeIs(99));
   for (std::uint32_t at = 0; at < 99; ++at)
     EXPECT_THAT(items[at], HasSubstr("requestId = " + std::to_string(at + 2) + ","));
+}
+
+// As while many other peers send all the time.
+TEST_F(LineTest, WritesThoughOtherTasksAreAlwaysReady) {
+  startGreeted();
+  const BusyTasks busy(io_);
+
+  line_->send(request(1));
+
+  EXPECT_THAT(receiveWhileBusy(), ElementsAre(HasSubstr("requestId = 1")));
 }
 
 TEST_F(LineTest, AFrameIsLimitedToTheBufferSize) {
