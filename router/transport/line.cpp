@@ -302,15 +302,25 @@ kj::Promise<void> Line::writeAll() {
                                       .bytes = limits_.bufferBytes,
                                       .messageBytes = maxMessageBytes()};
   if (events_.onTraffic) events_.onTraffic();
-  return stream_->write(queue_.buildFrames(limits, events_.onUnsendable)).then([this] {
-    if (resumeReading_) {
-      // The peer is alive: it reads, while its own items are not read here.
-      keepAlive_.received(Clock::nowNs());
-      if (!queue_.hasMaxAnswers()) std::exchange(resumeReading_, nullptr)->fulfill();
-    }
+  queue_.buildFrames(limits, events_.onUnsendable);
+  return writeParts().then([this] {
+    if (resumeReading_ && !queue_.hasMaxAnswers())
+      std::exchange(resumeReading_, nullptr)->fulfill();
     if (!isEnding()) events_.onRoom();
     queue_.framesWritten();  // now the queue may be idle, and the next item starts a write
     return writeAll();
+  });
+}
+
+// Writes the frames in parts, because each part that is written shows that the peer reads: while
+// reading is suspended, it is the only sign of life, and a slow peer may need longer than dead-time
+// for a long frame.
+kj::Promise<void> Line::writeParts() {
+  const auto part = queue_.nextPart();
+  if (part.size() == 0) return kj::READY_NOW;
+  return stream_->write(part).then([this] {
+    if (resumeReading_) keepAlive_.received(Clock::nowNs());
+    return writeParts();
   });
 }
 

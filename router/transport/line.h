@@ -137,6 +137,7 @@ class Line {
   template <class... Outgoing>
   void enqueue(Outgoing&&... outgoing);
   kj::Promise<void> writeAll();
+  kj::Promise<void> writeParts();
   void onWriteFailure(const std::string& why);
 
   kj::Promise<void> livenessLoop();

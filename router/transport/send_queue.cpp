@@ -135,8 +135,7 @@ void SendQueue::makeScratch(std::size_t bytes) {
   std::memset(scratch_.asBytes().begin(), 0, scratch_.asBytes().size());
 }
 
-SendQueue::Pieces SendQueue::buildFrames(const FrameLimits& limits,
-                                         const OnUnsendable& onUnsendable) {
+void SendQueue::buildFrames(const FrameLimits& limits, const OnUnsendable& onUnsendable) {
   framesWritten();
   std::size_t bytes = 0;
   do {
@@ -150,7 +149,20 @@ SendQueue::Pieces SendQueue::buildFrames(const FrameLimits& limits,
   } while (!queue_.empty() && limits.items == SIZE_MAX && bytes < limits.bytes);
   countWaiting();
   count(record_->bytesSent, bytes);
-  return {pieces_.data(), pieces_.size()};
+}
+
+// Shortens the pieces from the front.
+SendQueue::Pieces SendQueue::nextPart() {
+  part_.clear();
+  for (auto room = kPartBytes; room != 0 && nextPiece_ != pieces_.size();) {
+    auto& piece = pieces_[nextPiece_];
+    const auto bytes = std::min(room, piece.size());
+    if (bytes != 0) part_.push_back(piece.slice(0, bytes));
+    piece = piece.slice(bytes, piece.size());
+    room -= bytes;
+    if (piece.size() == 0) ++nextPiece_;
+  }
+  return {part_.data(), part_.size()};
 }
 
 std::size_t SendQueue::buildPlainFrame() {
@@ -207,6 +219,7 @@ void SendQueue::addPieces(capnp::MallocMessageBuilder& frame) {
 
 void SendQueue::framesWritten() {
   pieces_.clear();
+  nextPiece_ = 0;
   frame_ = nullptr;
   for (auto& run : runs_) {
     if (spareRuns_.size() == kSpareRuns) break;

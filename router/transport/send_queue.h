@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // SendQueue: the items that wait to be sent over one connection, and the frames built from them.
 //
-//   push() ─► queue ─► buildFrames(): as many as fit ─► the caller writes them ─► framesWritten()
+//   push() ─► queue ─► buildFrames(): as many items as fit ─► nextPart() ─► framesWritten()
+//                                                             ▲      │
+//                                                             └──────┘ the caller writes the part
 //
 // While frames are being written, items for the next ones gather in the queue. Plain items are
 // converted at once, and follow each other in a PlainRun, which becomes a frame of its own. Any
@@ -46,6 +48,7 @@ class SendQueue {
     std::uint64_t messageBytes = 0;  // longer messages are unsendable
   };
   static constexpr std::size_t kMaxControlItems = 4096;
+  static constexpr std::size_t kPartBytes = std::size_t{256} << 10;
 
   //   queueSize  messages that may wait
   SendQueue(std::uint32_t queueSize, PeerRecord& record);
@@ -70,10 +73,13 @@ class SendQueue {
   // Whether no item waits and no frame is being written.
   [[nodiscard]] bool isIdle() const noexcept { return isEmpty() && pieces_.empty(); }
 
-  // Moves at least one item, and as many as the limits allow, into frames. Returns the bytes of the
-  // frames in pieces, which are valid until framesWritten(). The queue must not be empty.
+  // Moves at least one item, and as many as the limits allow, into frames. The queue must not be
+  // empty.
+  void buildFrames(const FrameLimits& limits, const OnUnsendable& onUnsendable);
+  // Returns the next kPartBytes of the frames, or what is left, in pieces that are valid until the
+  // next call; nothing when all bytes have been returned.
   using Pieces = kj::ArrayPtr<const kj::ArrayPtr<const kj::byte>>;
-  [[nodiscard]] Pieces buildFrames(const FrameLimits& limits, const OnUnsendable& onUnsendable);
+  [[nodiscard]] Pieces nextPart();
   void framesWritten();
 
   // Empties the queue, and returns its requests and those that were rejected. Those that were plain
@@ -113,6 +119,8 @@ class SendQueue {
   std::vector<std::uint32_t> table_;  // its segment table
   std::vector<Run> runs_;
   std::vector<kj::ArrayPtr<const kj::byte>> pieces_;
+  std::size_t nextPiece_ = 0;  // the first one that nextPart() has not returned completely
+  std::vector<kj::ArrayPtr<const kj::byte>> part_;
   std::vector<Run> spareRuns_;
 };
 

@@ -101,6 +101,30 @@ TEST_F(LineTest, ContinuesWhileALongFrameArrives) {
   EXPECT_EQ(end_, "");
 }
 
+// The line does not read meanwhile, because the peer does not read the answers to its pings either.
+TEST_F(LineTest, ContinuesWhileThePeerReadsALongFrame) {
+  constexpr auto kPart = router::SendQueue::kPartBytes;
+  constexpr std::size_t kParts = 32;
+  limits_.deadTime = 400ms;
+  startGreeted();
+  line_->send(
+      Carried{.isRequest = true,
+              .client = 1,
+              .requestId = 1,
+              .message = Char8ArrayMessage::inBuffer(
+                  allocateHeapBody(Char8ArrayMessage::bytesFor(kParts * kPart)), kParts * kPart)});
+  settle();
+  beginToSend(frameOf(std::vector<Fill>(2 * router::SendQueue::kMaxControlItems, ping(1))));
+
+  for (std::size_t part = 0; part < kParts && end_.empty(); ++part) {
+    Bytes bytes(kPart);
+    peer_->read(bytes.data(), bytes.size()).wait(io_.waitScope);
+    io_.provider->getTimer().afterDelay(60 * kj::MILLISECONDS).wait(io_.waitScope);
+  }
+
+  EXPECT_EQ(end_, "");
+}
+
 TEST_F(LineTest, EndsWhenAFrameArrivesTooSlowly) {
   limits_.deadTime = 200ms;
   startGreeted();

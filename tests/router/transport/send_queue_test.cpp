@@ -27,9 +27,9 @@ class SendQueueTest : public testing::Test {
  protected:
   static constexpr std::uint32_t kQueueSize = 3;
 
-  // Builds the frames of one write, and returns their items as text.
+  // Builds frames, and returns their items as text.
   std::vector<std::string> frames(std::size_t items = SIZE_MAX) {
-    const auto pieces = queue_.buildFrames(
+    queue_.buildFrames(
         {.items = items, .bytes = 4096, .messageBytes = 1000},
         [&](const Carried& carried, const std::string& why, wire::Item::Builder instead) {
           unsendable_.push_back(std::to_string(carried.requestId) + ": " + why);
@@ -37,7 +37,12 @@ class SendQueueTest : public testing::Test {
         });
     std::vector<std::string> texts;
     kj::Vector<kj::byte> bytes;
-    for (const auto piece : pieces) bytes.addAll(piece);
+    partBytes_.clear();
+    for (auto part = queue_.nextPart(); part.size() != 0; part = queue_.nextPart()) {
+      const auto before = bytes.size();
+      for (const auto piece : part) bytes.addAll(piece);
+      partBytes_.push_back(bytes.size() - before);
+    }
     kj::ArrayInputStream stream(bytes);
     while (stream.tryGetReadBuffer().size() != 0) {
       capnp::InputStreamMessageReader frame(stream);
@@ -70,6 +75,7 @@ class SendQueueTest : public testing::Test {
   PeerRecord record_{row_};
   SendQueue queue_{kQueueSize, record_};
   std::vector<std::string> unsendable_;
+  std::vector<std::size_t> partBytes_;  // of the last frames
 };
 
 TEST_F(SendQueueTest, PutsAllThatWaitsIntoOneFrameInItsOrder) {
@@ -149,6 +155,20 @@ TEST_F(SendQueueTest, DividesALongRunOfPlainItems) {
   ASSERT_THAT(all, SizeIs(kItems));
   for (std::uint32_t id = 1; id <= kItems; ++id)
     ASSERT_THAT(all[id - 1], HasSubstr("requestId = " + std::to_string(id) + ","));
+}
+
+TEST_F(SendQueueTest, DividesLongFramesIntoParts) {
+  constexpr auto kPart = SendQueue::kPartBytes;
+  queue_.push(plain(1));
+  queue_.push([](auto item) { item.initFarewell().setReason(std::string(2 * kPart, 'x')); },
+              Origin::own);
+
+  const auto items = frames();
+
+  ASSERT_EQ(items.size(), 2u);
+  EXPECT_THAT(items[0], HasSubstr("requestId = 1, "));
+  EXPECT_GT(items[1].size(), 2 * kPart);
+  EXPECT_THAT(partBytes_, ElementsAre(kPart, kPart, testing::Lt(1024u)));
 }
 
 // The memory of a run is used again.
