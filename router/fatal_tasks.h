@@ -14,6 +14,8 @@ class FatalTasks final : private kj::TaskSet::ErrorHandler {
  public:
   FatalTasks() : tasks_(*this) {}
   void add(kj::Promise<void> task) { tasks_.add(kj::mv(task)); }
+  // Resolves when no task is left. Only one such promise may exist.
+  [[nodiscard]] kj::Promise<void> onEmpty() { return tasks_.onEmpty(); }
 
  private:
   void taskFailed(kj::Exception&& error) override { kj::throwFatalException(kj::mv(error)); }

@@ -27,9 +27,8 @@ bool isBorrowing(Connection& connection) noexcept {
   return link.borrowedFanOut() != 0;
 }
 
-using Channels = std::vector<std::shared_ptr<MessageLink>>;
-
-void keep(const std::shared_ptr<MessageLink>& channel, Channels& channels) noexcept try {
+void keep(const std::shared_ptr<MessageLink>& channel, Connections::Channels& channels) noexcept
+    try {
   channels.push_back(channel);
   // NOLINTNEXTLINE(bugprone-empty-catch): the server does not wait for this client
 } catch (const std::bad_alloc&) {
@@ -150,7 +149,10 @@ void Connections::removeClientOf(const Link& link) noexcept try {
 }
 
 // Also removes the files of clients whose death the server has not noticed yet: no later call will.
-void Connections::closeAll() noexcept {
+//
+// Clients of other users cannot remove the server's pool files, and none can remove those of the
+// fan-out pool, so the server removes them itself: these clients are returned.
+Connections::Channels Connections::closeAll() noexcept {
   Channels others;
   for (const auto& connection : all_) {
     if (!connection->channel) continue;
@@ -160,12 +162,13 @@ void Connections::closeAll() noexcept {
       keep(connection->channel, others);
     close(*connection);
   }
-  // Clients of other users cannot remove the server's pool files, and none can remove those of the
-  // fan-out pool, so the server removes them itself. It first gives these clients a moment to
-  // receive the replies that are in the pools.
+  return others;
+}
+
+void Connections::drain(const Channels& channels) noexcept {
   const auto deadline = Deadline::after(kDrainTimeout);
   const auto isReceiving = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
-  while (std::ranges::any_of(others, isReceiving) && !deadline.hasPassed())
+  while (std::ranges::any_of(channels, isReceiving) && !deadline.hasPassed())
     std::this_thread::sleep_for(kDrainPoll);
 }
 

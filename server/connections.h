@@ -45,8 +45,12 @@ class Connections {
   // Closes a connection without a message, if its client has closed the link.
   void closeIfClientClosed(Connection& connection) noexcept;
   void closeDead() noexcept;
-  // Closes all, and gives the clients a moment to receive the replies in the server's pools.
-  void closeAll() noexcept;
+  // Closes all. Returns the links of the clients that may still have to receive replies from the
+  // server's pools, and cannot do so when the link and the fan-out pool no longer exist.
+  using Channels = std::vector<std::shared_ptr<MessageLink>>;
+  [[nodiscard]] Channels closeAll() noexcept;
+  // Gives these clients a moment to receive the replies.
+  static void drain(const Channels& channels) noexcept;
 
   // By index in the endpoint. All objects exist; `channel` of one without a client is empty.
   [[nodiscard]] const std::vector<Connection::Pointer>& all() const noexcept { return all_; }

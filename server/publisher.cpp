@@ -66,13 +66,14 @@ Publisher::Publisher(const std::string& backplane, OwnWindow& window, ReplyCount
       serverWindow_(window.header().incarnation),
       maxBorrowed_(checkedMaxBorrowed(options.maxBorrowed)),
       stamps_(options.stampsReplies),
-      pool_(backplane, serverWindow_, options.rights, options.maxSharedBytes) {}
+      pool_(std::make_shared<FanOutPool>(backplane, serverWindow_, options.rights,
+                                         options.maxSharedBytes)) {}
 
 std::shared_ptr<FanOutChunk> Publisher::tryAlloc(std::size_t bytes) noexcept {
   if (forkGuard_.isInherited()) return nullptr;
-  if (auto chunk = pool_.tryAlloc(bytes)) return chunk;
+  if (auto chunk = pool_->tryAlloc(bytes)) return chunk;
   collectReturned();
-  return pool_.tryAlloc(bytes);
+  return pool_->tryAlloc(bytes);
 }
 
 BodyBytes Publisher::allocate(std::size_t bytes) {

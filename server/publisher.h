@@ -60,6 +60,8 @@ class Publisher {
   // Sends one message on its route, and tells its client how many messages of the request were
   // dropped before it.
   ReplyResult relay(const Message& message, std::uint32_t missed) noexcept;
+  // Its destructor removes the names of the messages, also of those that clients have not received.
+  [[nodiscard]] std::shared_ptr<const FanOutPool> pool() const noexcept { return pool_; }
 
  private:
   std::shared_ptr<FanOutChunk> tryAlloc(std::size_t bytes) noexcept;
@@ -78,7 +80,7 @@ class Publisher {
   std::uint64_t serverWindow_;
   std::uint32_t maxBorrowed_;
   bool stamps_;
-  FanOutPool pool_;
+  std::shared_ptr<FanOutPool> pool_;
   std::shared_ptr<FanOutBodies> bodies_ = std::make_shared<FanOutBodies>();
   std::mutex mutex_;  // guards the members below
   std::vector<std::weak_ptr<MessageLink>> borrowers_;  // links that have had a loan

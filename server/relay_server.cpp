@@ -8,6 +8,15 @@ namespace mpf {
 void RelayServer::onClient(std::function<void(std::uint64_t, bool)> callback) {
   core_->connections().onClient(std::move(callback));
 }
+std::shared_ptr<const void> RelayServer::closeAll() {
+  struct Pools {
+    Connections::Channels channels;
+    std::shared_ptr<const FanOutPool> fanOut;
+  };
+  auto channels = core_->closeAll();
+  if (channels.empty()) return nullptr;
+  return std::make_shared<Pools>(Pools{std::move(channels), core_->publisher().pool()});
+}
 void RelayServer::setPolled(bool isPolled) noexcept { core_->setPolled(isPolled); }
 Deadline RelayServer::takeBefore() const noexcept { return core_->takeBefore(); }
 ReplyResult RelayServer::replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message) {

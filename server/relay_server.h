@@ -21,6 +21,11 @@ class RelayServer : public MessageServer {
   // receive() calls it. Set it before the first receive(). When it throws, receive() finishes its
   // work on the connections and then throws the same exception.
   void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback);
+  // Closes all connections, as the destructor does, which then does not wait for the clients. Call
+  // no other function afterwards.
+  //   returns  what has to exist for a moment longer, even without the server, so that clients
+  //            receive the replies in its pools; nullptr: nothing
+  [[nodiscard]] std::shared_ptr<const void> closeAll();
   // The deadline that the client gave to the request that receive() returned last.
   [[nodiscard]] Deadline takeBefore() const noexcept;
   // As reply(), to a request whose handle no longer exists. The caller has kept the results of

@@ -65,9 +65,13 @@ ServerCore::~ServerCore() {
   keeper_.leave();
   if (endpoint_.forkGuard().isInherited()) return;
   MPF_STEP(server_leaving);
+  Connections::drain(closeAll());
+}
+
+Connections::Channels ServerCore::closeAll() noexcept {
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
   connections_.onClient(nullptr);
-  connections_.closeAll();
+  return connections_.closeAll();
 }
 
 void ServerCore::setQueueSize(int size) {

@@ -44,6 +44,8 @@ class ServerCore {
 
   [[nodiscard]] Acceptor& acceptor() noexcept { return acceptor_; }
   [[nodiscard]] Connections& connections() noexcept { return connections_; }
+  // Closes the window and all connections. Returns as Connections::closeAll().
+  [[nodiscard]] Connections::Channels closeAll() noexcept;
   [[nodiscard]] ReplySender& replies() noexcept { return replies_; }
   [[nodiscard]] Publisher& publisher() noexcept { return publisher_; }
   [[nodiscard]] Handlers& handlers() noexcept { return handlers_; }

@@ -31,9 +31,12 @@ ClientRouter::~ClientRouter() {
 
 kj::Promise<void> ClientRouter::stop() {
   state_ = State::stopping;
-  if (!line_) return kj::READY_NOW;
-  line_->end(FarewellCode::STOPPING, "the router is stopping");
-  return loop_.addBranch();
+  auto isClosed = kj::Promise<void>(kj::READY_NOW);
+  if (line_) {
+    line_->end(FarewellCode::STOPPING, "the router is stopping");
+    isClosed = loop_.addBranch();
+  }
+  return isClosed.then([this] { return servers_.whenProxiesAreGone(); });
 }
 
 // A failure to connect is handled as the end of a line: the router waits and tries again.

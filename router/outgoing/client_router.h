@@ -41,7 +41,8 @@ class ClientRouter {
   void setPendingBinds(const std::set<ServerName>& pendingBinds) {
     servers_.setPendingBinds(pendingBinds);
   }
-  // Ends the connection with a farewell. The promise resolves when it is closed.
+  // Ends the connection with a farewell. The promise resolves when it is closed, and the local
+  // clients have had the time to receive what has arrived. Call it once.
   [[nodiscard]] kj::Promise<void> stop();
 
  private:

@@ -69,6 +69,8 @@ class Proxy final : private Polled {
   void drain(Fate fate);
   [[nodiscard]] bool isDraining() const noexcept { return state_ == State::draining; }
   [[nodiscard]] bool isDone() const noexcept;
+  // Disconnects the clients. Returns what has to exist for a moment longer, as RelayServer.
+  [[nodiscard]] std::shared_ptr<const void> closeAll() { return server_.closeAll(); }
   [[nodiscard]] bool hasClients() const noexcept { return !clients_.empty(); }
 
  private:

@@ -13,6 +13,8 @@ namespace {
 
 constexpr std::int64_t kIdleProxyNs = 60'000'000'000;  // how long a proxy without clients is kept
 constexpr std::int64_t kBindAgainNs = 2'000'000'000;  // pause after a refused bind
+// How long the pools of an ended proxy are kept for clients that have not received its replies.
+constexpr auto kReceiveTime = 100 * kj::MILLISECONDS;
 constexpr int kTurn = 16;  // requests of one server before those of the next server
 constexpr int kMaxTurns = 256;  // turns before the event loop runs its other tasks
 constexpr std::chrono::seconds kSweepEvery{1};  // while isPending() is true for a server
@@ -63,7 +65,7 @@ void RemoteServers::disconnect(const std::string& why) {
       proxy->endRequest(request.client, request.requestId, Fate::neverTaken, why);
   }
   for (auto& [name, wanted] : wanted_) {
-    wanted.proxy.reset();
+    endProxy(wanted);
     wanted.offer.reset();
     wanted.binding = 0;
     wanted.bindAgainNs = 0;
@@ -165,6 +167,16 @@ void RemoteServers::makeProxy(const ServerName& name, Wanted& wanted) try {
   wanted.problem = error.what();
 }
 
+// Keeps the pools of the proxy for a while instead of waiting for its clients, as the destructor of
+// a server does: one that is stopped would delay all traffic of the router.
+void RemoteServers::endProxy(Wanted& wanted) {
+  if (!wanted.proxy) return;
+  auto pools = wanted.proxy->closeAll();
+  wanted.proxy.reset();
+  if (!pools) return;
+  ending_.add(context_.timer.afterDelay(kReceiveTime).then([pools = std::move(pools)] {}));
+}
+
 // Makes proxies for new offers, destroys those that are done, and forgets the servers that have
 // been idle for kIdleProxyNs.
 void RemoteServers::sweep() {
@@ -176,6 +188,7 @@ void RemoteServers::sweep() {
       continue;
     }
     unbind(wanted);
+    endProxy(wanted);
     each = wanted_.erase(each);
   }
   bindWanted();
@@ -186,7 +199,7 @@ void RemoteServers::sweep() {
 void RemoteServers::updateProxy(const ServerName& name, Wanted& wanted) {
   if (wanted.proxy && wanted.proxy->isDone()) {
     log_.info("{} at location {} is no longer available", name.server, name.location);
-    wanted.proxy.reset();
+    endProxy(wanted);
   }
   if (!wanted.proxy && wanted.offer && connection_) makeProxy(name, wanted);
   if (wanted.proxy && wanted.proxy->hasClients()) wanted.idleSinceNs = 0;

@@ -38,6 +38,9 @@ class RemoteServers {
   // The line has ended. Requests that were never written to it end as neverTaken. All others end at
   // the local clients when the proxies are destroyed, as with any server that exits.
   void disconnect(const std::string& why);
+  // Resolves when the local clients have had the time to receive what the proxies have sent. Call
+  // it once, when no connection follows.
+  [[nodiscard]] kj::Promise<void> whenProxiesAreGone() { return ending_.onEmpty(); }
 
   // Handles an item of the peer. Items for a client that has disconnected are ignored.
   //   throws  ProtocolError
@@ -68,6 +71,7 @@ class RemoteServers {
   void onFate(wire::RequestEnd::Reader fate);
   void onRefusal(const ServerName& name, Wanted& wanted, const std::string& why);
   void makeProxy(const ServerName& name, Wanted& wanted);
+  void endProxy(Wanted& wanted);
   void sweep();
   void sweepSoon();
   void updateProxy(const ServerName& name, Wanted& wanted);
@@ -84,6 +88,7 @@ class RemoteServers {
   std::unordered_map<std::uint32_t, ServerName> bindings_;  // of the connection
   std::uint32_t lastBinding_ = 0;
   ServerName pumped_;  // the server whose requests were taken last
+  FatalTasks ending_;  // they keep the pools of proxies that have ended
 };
 
 }  // namespace mpf::router

@@ -214,7 +214,7 @@ TEST_F(ConnectionsTest, CloseAllEndsEachConnection) {
   accept(first);
   accept(second);
 
-  connections_.closeAll();
+  static_cast<void>(connections_.closeAll());
 
   EXPECT_EQ(first.peerState(), layout::LinkState::closed);
   EXPECT_EQ(second.peerState(), layout::LinkState::closed);

@@ -61,7 +61,7 @@ class PublisherTest : public ServerPartsTest {
         [](const auto& name) { return SegmentName::tryParse(name)->kind == NameKind::fanOut; }));
   }
   void TearDown() override {
-    connections_.closeAll();
+    static_cast<void>(connections_.closeAll());
     publisher_.reset();
     ServerPartsTest::TearDown();
   }

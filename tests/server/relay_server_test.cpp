@@ -238,6 +238,33 @@ TEST_F(RelayRunTest, RepliesHaveTheTimeStampsThatTheyAreGiven) {
   EXPECT_EQ(next().getTimeStampNs(), 1001);
 }
 
+// A message that counts missed ones is in the fan-out pool, of which only the server removes files.
+TEST_F(RelayTest, AServerThatHasClosedWaitsForNoClientWhileItsPoolsAreKept) {
+  constexpr std::size_t kImageBytes = 100'000;
+  auto& server = startWatched();
+  bindByHand();
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  auto request = take();
+  const auto client = server.clientOf(request);
+  const auto id = request.route().requestId;
+  ASSERT_EQ(server.reply(std::move(request)), ReplyResult::sent);
+  auto image = Char8ArrayMessage::inBuffer(
+      allocateHeapBody(Char8ArrayMessage::bytesFor(kImageBytes)), kImageBytes);
+  image.setRoute({0, 0, Message::missedFlags(5), nullptr});
+  ASSERT_EQ(server.replyTo(client, id, std::move(image)), ReplyResult::sent);
+
+  auto pools = server.closeAll();
+  server_.reset();
+
+  EXPECT_NE(pools, nullptr);
+  static_cast<void>(next());
+  {
+    const auto received = next();
+    EXPECT_EQ(received.getMissed(), 5u);
+    EXPECT_GE(received.body().size(), kImageBytes);
+  }
+}
+
 // A router reports in this way that a queue behind it is full.
 TEST_F(RelayTest, AServerMayReportThatAQueueIsFull) {
   auto& server = startWatched();

@@ -48,7 +48,7 @@ class ServerPartsTest : public ShmTest {
   }
   layout::WindowControl& control() { return server_->endpoint.control(); }
   void TearDown() override {
-    connections_.closeAll();
+    static_cast<void>(connections_.closeAll());
     client_.reset();
     server_.reset();
     ShmTest::TearDown();

@@ -137,6 +137,27 @@ TEST_F(RemoteServersTest, EndARequestThatThePeerMayHaveAsOutcomeUnknownWhenDisco
   EXPECT_THAT(caller_->messages, IsEmpty());
 }
 
+// The router does not wait for the client. A reply with a number of missed ones is in a pool of
+// which only the proxy removes the files.
+TEST_F(RemoteServersTest, LeaveRepliesToAClientThatReceivesThemAfterTheConnection) {
+  connectClient();
+  const auto id = sendRequest();
+  sendItems({test::reply(1, id, true), [id](wire::Item::Builder item) {
+               auto further = item.initReply();
+               further.setClient(1);
+               further.setRequestId(id);
+               further.setMissed(5);
+               further.initMessage().initUser().initValue(100'000);
+             }});
+
+  servers_->disconnect("cut");
+  runClientUntil([this] { return !caller_->isConnected(); });
+
+  ASSERT_EQ(caller_->messages.size(), 2u);
+  EXPECT_EQ(caller_->messages[1].getMissed(), 5u);
+  servers_->whenProxiesAreGone().wait(io_.waitScope);
+}
+
 TEST_F(RemoteServersTest, RefuseARequestThatCannotBeSent) {
   connectClient();
   const auto id = sendRequest();
