@@ -51,6 +51,15 @@ std::optional<Segment> openConflicting(const std::string& name, layout::SegmentK
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 }
 
+[[noreturn]] void throwNameInUse(const Segment& window) {
+  const auto& header = window.header();
+  throw NameInUse(
+      fmt::format("server \"{}\" at location {} is already running: {}, pid {} ({}); stop it, or "
+                  "use another name, location or backplane",
+                  segments::text(header.name), header.location, segments::text(header.program),
+                  header.ownerPid, segments::path(window.name())));
+}
+
 // Returns if the conflicting window of a name has disappeared or is about to be removed. Otherwise
 // throws an exception that says which process has the name.
 //   reaperIsLate  how long to wait for another process that removes a dead window
@@ -62,11 +71,7 @@ void checkConflict(const std::string& name, layout::SegmentKind kind, Deadline r
     case segments::Owner::absent:
       return;
     case segments::Owner::alive:
-      throw NameInUse(fmt::format(
-          "server \"{}\" at location {} is already running: {}, pid {} ({}); stop it, or "
-          "use another name, location or backplane",
-          segments::text(header.name), header.location, segments::text(header.program),
-          header.ownerPid, segments::path(name)));
+      throwNameInUse(*window);
     case segments::Owner::dead:
       if (segments::removeIfOwnerless(name)) return;
       if (!reaperIsLate.hasPassed() &&
@@ -98,6 +103,15 @@ Rights joined(const Rights& now, Rights added) {
 }
 
 }  // namespace
+
+void checkNameIsFree(const std::string& name) {
+  // userOf() needs no descriptor: if no descriptor is left, the error of OwnWindow says so.
+  const bool exists = segments::userOf(name).has_value();
+  if (!exists || segments::probeOwner(name) != segments::Owner::alive) return;
+  const auto window = openConflicting(name, layout::SegmentKind::serverWindow);
+  if (window && segments::probeOwner(name, window->header().incarnation) == segments::Owner::alive)
+    throwNameInUse(*window);
+}
 
 OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
                      const std::string& name, Rights rights,

@@ -28,6 +28,11 @@
 
 namespace mpf {
 
+// Throws NameInUse at once if a running process has the name of a server window. The constructor of
+// OwnWindow first gives this process some time to end.
+//   throws  NameInUse, and SegmentError if a process uses a file that is not a usable window
+void checkNameIsFree(const std::string& name);
+
 class OwnWindow {
  public:
   // `describe` fills in name, location and geometry before the window gets its name.

@@ -7,6 +7,8 @@
 
 #include "router/transport/kj_text.h"
 #include "shm/link.h"
+#include "shm/segment_name.h"
+#include "shm/window.h"
 
 namespace mpf::router {
 namespace {
@@ -119,7 +121,8 @@ void RemoteServers::unbind(const Wanted& wanted) {
 void RemoteServers::onServer(wire::Server::Reader server) {
   const auto binding = bindings_.find(server.getBinding());
   if (binding == bindings_.end()) return;  // it was unbound while this item was on its way
-  auto& wanted = wanted_.at(binding->second);
+  const auto name = binding->second;
+  auto& wanted = wanted_.at(name);
   switch (server.getState()) {
     case wire::Server::State::THERE:
       wanted.offer = Proxy::Offer{server.getBinding(), server.getIncarnation(), queueSizeOf(server),
@@ -127,7 +130,7 @@ void RemoteServers::onServer(wire::Server::Reader server) {
       if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);  // it was for an earlier incarnation
       break;
     case wire::Server::State::REFUSED:
-      onRefusal(binding->second, wanted, displayText(server.getReason()));
+      onRefusal(name, wanted, displayText(server.getReason()));
       bindings_.erase(binding);
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
@@ -141,7 +144,8 @@ void RemoteServers::onServer(wire::Server::Reader server) {
       if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
       break;
   }
-  sweep();
+  updateProxy(name, wanted);
+  if (isPending(wanted)) sweepSoon();
 }
 
 // Binds again after a while, since the configuration of the peer may change.
@@ -156,6 +160,9 @@ void RemoteServers::onRefusal(const ServerName& name, Wanted& wanted, const std:
 
 void RemoteServers::makeProxy(const ServerName& name, Wanted& wanted) try {
   if (!wanted.offer) return;
+  // If the name is in use, the constructor of a server waits for a while. Here, the next sweep()
+  // tries again.
+  checkNameIsFree(SegmentName::serverWindow(context_.backplane.name(), name.location, name.server));
   wanted.proxy = std::make_unique<Proxy>(context_, *connection_, name, *wanted.offer);
   wanted.offer.reset();
   wanted.problem.clear();

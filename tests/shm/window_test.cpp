@@ -99,6 +99,18 @@ TEST_F(WindowTest, RefusesANameInUseAndNamesTheOwner) {
   EXPECT_TRUE(openServer()->hasOwner());
 }
 
+TEST_F(WindowTest, ChecksWhetherANameIsFree) {
+  checkNameIsFree(serverName());
+  auto server = makeServer();
+
+  EXPECT_THAT(whatOf<NameInUse>([&] { checkNameIsFree(serverName()); }),
+              AllOf(HasSubstr(segments::path(serverName())), HasSubstr("shm_test"),
+                    HasSubstr(std::to_string(::getpid()))));
+
+  server.reset();
+  checkNameIsFree(serverName());
+}
+
 TEST_F(WindowTest, ReplacesTheWindowOfAKilledOwnerAtOnce) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();

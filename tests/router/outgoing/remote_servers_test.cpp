@@ -3,6 +3,10 @@
 // local clients use through its proxy.
 #include "router/outgoing/remote_servers.h"
 
+#include <unistd.h>
+
+#include <mpf/message_server.h>
+
 #include "tests/router/router_parts_fixture.h"
 #include "tests/router/server_items.h"
 #include "tests/support/caller.h"
@@ -156,6 +160,22 @@ TEST_F(RemoteServersTest, LeaveRepliesToAClientThatReceivesThemAfterTheConnectio
   ASSERT_EQ(caller_->messages.size(), 2u);
   EXPECT_EQ(caller_->messages[1].getMissed(), 5u);
   servers_->whenProxiesAreGone().wait(io_.waitScope);
+}
+
+TEST_F(RemoteServersTest, OfferAServerOnceItsNameIsFree) {
+  std::optional<MessageServer> other(std::in_place, backplane_, "echo",
+                                     ServerOptions{.location = 1});
+  servers_->connect(*line_);
+  servers_->setPendingBinds({{1, "echo"}});
+  EXPECT_THAT(nextItem(), StartsWith("(bind = "));
+
+  sendItems({server(1, wire::Server::State::THERE)});
+  EXPECT_THAT(logged_, AllOf(HasSubstr("cannot be offered here: server \"echo\" at location 1 is "
+                                       "already running"),
+                             HasSubstr(std::to_string(::getpid()))));
+  other.reset();
+
+  runUntil([this] { return logged_.find("is available") != std::string::npos; });
 }
 
 TEST_F(RemoteServersTest, RefuseARequestThatCannotBeSent) {
