@@ -71,7 +71,8 @@ class Proxy final : private Polled {
   [[nodiscard]] bool isDone() const noexcept;
   // Disconnects the clients. Returns what has to exist for a moment longer, as RelayServer.
   [[nodiscard]] std::shared_ptr<const void> closeAll() { return server_.closeAll(); }
-  [[nodiscard]] bool hasClients() const noexcept { return !clients_.empty(); }
+  // Whether local clients are connected, also those that the peer does not accept.
+  [[nodiscard]] bool hasClients() const noexcept { return !numbers_.empty(); }
 
  private:
   enum class State { idle, ready, draining };

@@ -76,6 +76,16 @@ TEST_F(ProxyTest, AReplyThatUsesUpTheWindowGivesItAllBack) {
   EXPECT_THAT(nextItem(), HasSubstr("(credit = (client = 1, bytes = 1048576))"));
 }
 
+TEST_F(ProxyTest, ClientsThatThePeerDoesNotAcceptAreClients) {
+  Proxy other(context_, *connection_, {1, "other"}, {.binding = 2, .queueSize = 4});
+  EXPECT_FALSE(other.hasClients());
+  const Caller caller(dispatcher_, "other");  // the peer accepts one client, which is caller_
+
+  runClientUntil([&] { return caller.isConnected(); });
+
+  EXPECT_TRUE(other.hasClients());
+}
+
 TEST_F(ProxyTest, AShortageOfDescriptorsIsLogged) {
   const Caller another(dispatcher_);
   dispatcher_.runPending();  // asks to be accepted
