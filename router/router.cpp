@@ -154,14 +154,21 @@ void Router::readPendingBinds() {
   pendingBindProblem_ = std::move(problem);
 }
 
-void Router::reload(const RouterConfig& config) {
-  openTls(config);
-  if (config.backplane != context_.config.backplane || config.name != context_.config.name)
+// Keeps what cannot change while the router runs: tools and peers know its name.
+void Router::replaceConfig(const RouterConfig& config) {
+  const auto old = std::exchange(context_.config, config);
+  context_.config.name = old.name;
+  context_.config.backplane = old.backplane;
+  if (config.backplane != old.backplane || config.name != old.name)
     context_.log.warn(
         "a new name or backplane takes effect when the router is restarted; the name is still {}",
-        context_.config.name);
+        old.name);
   context_.log.setLevel(config.logLevel);
-  context_.config = config;
+}
+
+void Router::reload(const RouterConfig& config) {
+  openTls(config);
+  replaceConfig(config);
   std::erase_if(listeners_, [&](const auto& listener) {
     return std::ranges::find(config.listen, listener->listen()) == config.listen.end();
   });

@@ -48,6 +48,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
 
  private:
   void openTls(const RouterConfig& config);
+  void replaceConfig(const RouterConfig& config);
   Listener& listen(const Listen& listen);
   void listenAfterReload(const Listen& listen);
   void onCaller(const Listen& listen, Listener::Caller caller);

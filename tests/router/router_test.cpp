@@ -132,6 +132,23 @@ TEST_F(SlowLookupTest, ThatFailsIsLoggedWithItsStepAndReason) {
       "cannot reach slow.lab:9900: the look-up of slow.lab failed: Name or service not known\n");
 }
 
+using ReloadTest = HeldRouterTest;
+
+TEST_F(ReloadTest, WarnsAsLongAsTheFileHasAnotherName) {
+  auto renamed = config();
+  renamed.name = "another";
+
+  for (int reloads = 0; reloads < 2; ++reloads) {
+    said_.clear();
+    router_->reload(renamed);
+    EXPECT_THAT(said_, testing::HasSubstr("the name is still test"));
+  }
+
+  said_.clear();
+  router_->reload(config());
+  EXPECT_EQ(said_, "");
+}
+
 // For example when the end of a connection cannot be logged: otherwise the router would keep
 // running without reconnecting.
 using RemoteTest = HeldRouterTest;
