@@ -13,7 +13,7 @@ namespace mpf::router {
 FarClient::FarClient(const Shared& shared, const Terms& terms)
     : shared_(shared),
       terms_(terms),
-      window_(fullWindow()),
+      window_(terms.window),
       held_(terms.queueSize, shared.heldBytes),
       client_(std::in_place, shared.dispatcher,
               [this](Message&& message) { onMessage(std::move(message)); }) {
@@ -23,10 +23,6 @@ FarClient::FarClient(const Shared& shared, const Terms& terms)
 void FarClient::bind(const std::string& server, std::int32_t location) {
   client_->bind(server, location);
   if (client_->lacksResources()) throw std::runtime_error(client_->notConnectedBecause());
-}
-
-std::int64_t FarClient::fullWindow() const noexcept {
-  return std::max<std::int64_t>(terms_.window, 1);
 }
 
 // ---- to the server
@@ -231,7 +227,7 @@ void FarClient::endRequest(std::uint32_t requestId, Fate fate, const std::string
 }
 
 void FarClient::credit(std::uint32_t bytes) {
-  window_ = std::min(window_ + bytes, fullWindow());
+  window_ = std::min<std::int64_t>(window_ + bytes, terms_.window);
   if (window_ > 0 && client_) client_->resume();
 }
 

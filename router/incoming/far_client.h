@@ -57,7 +57,7 @@ class FarClient final : private RunReceiver {
     std::uint32_t binding = 0;
     std::uint64_t incarnation = 0;  // of the server; requests never go to another incarnation
     std::uint32_t queueSize = 0;  // of the server
-    std::uint32_t window = 0;  // bytes of replies that may be on their way
+    std::uint32_t window = 0;  // bytes of replies that may be on their way; at least 1
   };
   // `shared` and what it refers to outlive this object.
   FarClient(const Shared& shared, const Terms& terms);
@@ -103,7 +103,6 @@ class FarClient final : private RunReceiver {
   void hold(HeldRequest request);
   void expire();
   void expireAt(Deadline deadline);
-  [[nodiscard]] std::int64_t fullWindow() const noexcept;
   void sendQueueFull();
   void endRequest(std::uint32_t requestId, Fate fate, const std::string& why);
 

@@ -232,6 +232,9 @@ void LocalServers::sendAbsent(const Binding& binding) {
 void LocalServers::onOpen(wire::Open::Reader open) {
   const auto number = open.getClient();
   clients_.open(number);
+  if (open.getWindow() == 0)
+    throw ProtocolError(FarewellCode::PROTOCOL,
+                        fmt::format("client {} has a window of 0 bytes", number));
   const auto found = bindings_.find(open.getBinding());
   if (found == bindings_.end()) return;
   const auto& binding = found->second;

@@ -20,13 +20,14 @@ inline Fill bind(std::uint32_t binding, const std::string& server = "echo",
   };
 }
 
-inline Fill open(std::uint32_t client, std::uint32_t binding, std::uint64_t incarnation) {
+inline Fill open(std::uint32_t client, std::uint32_t binding, std::uint64_t incarnation,
+                 std::uint32_t window = 1u << 20) {
   return [=](wire::Item::Builder item) {
     auto open = item.initOpen();
     open.setClient(client);
     open.setBinding(binding);
     open.setIncarnation(incarnation);
-    open.setWindow(1u << 20);
+    open.setWindow(window);
   };
 }
 

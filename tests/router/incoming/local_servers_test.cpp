@@ -179,5 +179,13 @@ TEST_F(LocalServersTest, EndTheConnectionOfAPeerThatOpensABindingTwice) {
   close();
 }
 
+TEST_F(LocalServersTest, EndTheConnectionOfAPeerThatOpensAClientWithoutAWindow) {
+  sendItems({open(1, 1, 1, 0)});
+
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("farewell"), HasSubstr("code = protocol"),
+                                HasSubstr("client 1 has a window of 0 bytes")));
+  close();
+}
+
 }  // namespace
 }  // namespace mpf::test
