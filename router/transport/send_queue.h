@@ -48,7 +48,7 @@ class SendQueue {
     std::uint64_t messageBytes = 0;  // longer messages are unsendable
   };
   static constexpr std::size_t kMaxControlItems = 4096;
-  static constexpr std::size_t kPartBytes = std::size_t{256} << 10;
+  static constexpr std::size_t kPartBytes = std::size_t{1} << 20;
 
   //   queueSize  messages that may wait
   SendQueue(std::uint32_t queueSize, PeerRecord& record);
