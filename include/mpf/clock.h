@@ -66,8 +66,8 @@ class Deadline {
   // The same for other units: a number that does not fit into Nanoseconds is not converted.
   template <std::integral Rep, class Period>
   [[nodiscard]] static Deadline after(std::chrono::duration<Rep, Period> wait) noexcept {
-    using Fraction = std::chrono::duration<double, std::nano>;
-    if (Fraction(wait) >= Fraction(Nanoseconds::max())) return never();
+    const std::chrono::duration<double, std::nano> rounded = wait;
+    if (rounded >= Nanoseconds::max()) return never();
     return after(wait.count() <= 0 ? Nanoseconds(0) : Nanoseconds(wait));
   }
   // A deadline at this CLOCK_MONOTONIC [ns]; INT64_MAX means never(). Processes of one host may
