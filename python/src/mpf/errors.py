@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Error(Exception):
-    """Any failure that this package reports. It can be pickled; a reply is None in the copy."""
+    """Any failure that this package reports. It can be pickled; the copy has no reply."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         attributes = dict(self.__dict__)
@@ -94,7 +94,7 @@ class UnexpectedReply(Error):
     """The reply is of another class than the call expects."""
 
     def __init__(self, server: str, reply: Message) -> None:
-        #: The reply; None in a copy.
+        #: The reply; None after pickling.
         self.reply: Message | None = reply
         super().__init__(
             f"{server}: the reply is a {type(reply).__name__}; "
@@ -114,7 +114,7 @@ class StatusError(Error):
     """
 
     def __init__(self, text: str, reply: Message | None = None, *, status: int = -1) -> None:
-        #: The reply; None if a handler raised the exception, and in a copy.
+        #: The reply; None if a handler raised the exception, and after pickling.
         self.reply = reply
         #: The status of the reply.
         self.status: int = status if reply is None else getattr(reply, "status")
