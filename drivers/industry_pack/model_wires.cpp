@@ -21,8 +21,6 @@
 #include <type_traits>
 #include <utility>
 
-#include <mpf/clock.h>
-
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
 
@@ -82,10 +80,10 @@ namespace {
 class FileLock {
  public:
   FileLock(int fd, const std::string& path) : fd_(fd) {
-    const auto deadline = Deadline::after(std::chrono::seconds(2));
-    while (::flock(fd, LOCK_EX | LOCK_NB) < 0) {
+    constexpr int kTries = 2000;  // counted, because a time would pass while the host is suspended
+    for (int tries = 1; ::flock(fd, LOCK_EX | LOCK_NB) < 0; ++tries) {
       if (errno != EWOULDBLOCK && errno != EINTR) throwSystemError(errno, "lock", path);
-      if (deadline.hasPassed())
+      if (tries == kTries)
         throw std::runtime_error(
             fmt::format("{} is locked by another process, which may be stopped", path));
       std::this_thread::sleep_for(std::chrono::milliseconds(1));

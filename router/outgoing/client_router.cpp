@@ -91,8 +91,8 @@ void ClientRouter::onGreeting(const PeerGreeting& greeting) {
   connectedNs_ = Clock::nowNs();
   problem_.clear();
   count((*record_)->connects);
+  record_->setProblem({});  // first: tools show it beside the state
   record_->setState(layout::RouterLineState::connected);
-  record_->setProblem({});
   log_.info("connected to {} at {} ({})", greeting.router, remote_.address.text(),
             greeting.program);
   servers_.connect(*line_);

@@ -260,7 +260,7 @@ TEST_F(RouterNetworkTest, AHostThatIsSilentForAWhileIsConnectedAgain) {
     openServer();
     wire->mend();
 
-    runUntil([&] { return caller_->news.size() == news + 2; });
+    runUntil([&] { return caller_->news.size() >= news + 2; });
     expectAnswer();
   }
 }

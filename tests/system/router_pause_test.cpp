@@ -26,7 +26,7 @@ TEST_F(RouterPauseTest, AStoppedRemoteRouterIsDisconnectedAndConnectedAgain) {
 
     routers_.farRouter().stop();
     send(10);
-    runUntil([&] { return caller_->news.size() == news + 1; });
+    runUntil([&] { return caller_->news.size() >= news + 1; });
     EXPECT_EQ(caller_->messages.size(), 10u);
     for (auto message = caller_->take(); message; message = caller_->take()) {
       EXPECT_THAT(fateOf(message), testing::AnyOf(Fate::outcomeUnknown, Fate::neverTaken));
@@ -50,7 +50,7 @@ TEST_F(RouterPauseTest, AStoppedLocalRouterConnectsAgain) {
   send(1);
   routers_.nearRouter().resume();
 
-  runUntil([&] { return caller_->news.size() == 3; });
+  runUntil([&] { return caller_->news.size() >= 3; });
   EXPECT_THAT(caller_->news,
               testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo,
                                    ConnectStatus::connectYes));

@@ -99,8 +99,8 @@ class Subscription(SubscriptionBase["Client", M]):
         request = self._send()
         if request is None:
             return None
-        self._begin(request)
         try:
+            self._begin(request)
             return cast(M, request.wait())
         except BaseException as error:  # also Ctrl-C, which has cancelled the request
             self._drop()

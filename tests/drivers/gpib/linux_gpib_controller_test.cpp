@@ -214,8 +214,8 @@ TEST_F(LinuxGpibControllerTest, EachErrorIsAStatusAndTheNextOperationWorks) {
     for (const auto error : {Error::systemCall, Error::notController, Error::noListener,
                              Error::notSystemController, Error::aborted, Error::noBoard}) {
       library_.fail(function, error, ENODEV);
-      auto result = controller_->write(kEcho, raw("a"), true, soon());
-      if (result.ok()) result = controller_->read(kEcho, {.maxBytes = 1}, soon());
+      auto result = controller_->write(kEcho, raw("a"), true, patient());
+      if (result.ok()) result = controller_->read(kEcho, {.maxBytes = 1}, patient());
       // A read that was interrupted once goes on.
       const bool mayContinue = std::string_view(function) == "ibrd" && error == Error::aborted;
       EXPECT_EQ(result.ok(), mayContinue) << function;

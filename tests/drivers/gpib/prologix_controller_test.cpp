@@ -195,6 +195,8 @@ TEST_P(PrologixControllerTest, PollsInstrumentsAndSeesServiceRequests) {
 }
 
 TEST_P(PrologixControllerTest, APollOfAnAbsentInstrumentTimesOut) {
+  ASSERT_TRUE(controller_.interfaceClear(patient()).ok());
+
   const auto poll = controller_.serialPoll(kAbsent, soon());
 
   EXPECT_EQ(poll.status, GpibStatus::timeout);

@@ -21,7 +21,7 @@ namespace mpf::test {
 
 class TerminalServer {
  public:
-  explicit TerminalServer(int family = AF_INET) : family_(family) { listen(0); }
+  explicit TerminalServer(int family = AF_INET) : family_(family), holder_(bind()) { switchOn(); }
 
   [[nodiscard]] TcpAddress address() const {
     return {family_ == AF_INET ? "127.0.0.1" : "::1", std::to_string(port_)};
@@ -36,26 +36,30 @@ class TerminalServer {
         checkCall(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept"));
   }
   void switchOff() { listener_.reset(); }
-  void switchOn() { listen(port_); }
+  void switchOn() {
+    listener_ = bind();
+    checkCall(::listen(listener_.get(), 1), "listen");
+  }
 
  private:
-  void listen(std::uint16_t port) {
-    listener_.reset(checkCall(::socket(family_, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
+  // A socket at this port; the first chooses the port.
+  FileDescriptor bind() {
+    FileDescriptor made(checkCall(::socket(family_, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
     const int yes = 1;
-    checkCall(::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes),
-              "setsockopt");
+    checkCall(::setsockopt(made.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes), "setsockopt");
     sockaddr_in6 address{};  // the port is at the same place in sockaddr_in
     address.sin6_family = static_cast<sa_family_t>(family_);
-    address.sin6_port = htons(port);
+    address.sin6_port = htons(port_);
     socklen_t length = family_ == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6);
     auto* generic = reinterpret_cast<sockaddr*>(&address);
-    checkCall(::bind(listener_.get(), generic, length), "bind");
-    checkCall(::listen(listener_.get(), 1), "listen");
-    checkCall(::getsockname(listener_.get(), generic, &length), "getsockname");
+    checkCall(::bind(made.get(), generic, length), "bind");
+    checkCall(::getsockname(made.get(), generic, &length), "getsockname");
     port_ = ntohs(address.sin6_port);
+    return made;
   }
   const int family_;
   std::uint16_t port_ = 0;
+  FileDescriptor holder_;  // never listens: other programs do not get the port meanwhile
   FileDescriptor listener_;
 };
 

@@ -63,8 +63,9 @@ class LineTest : public testing::Test {
     start();
     EXPECT_THAT(receive(), testing::ElementsAre(testing::HasSubstr("greeting = ")));
     send(frameOf({ours}));
-    EXPECT_THAT(receive(), testing::ElementsAre(testing::StartsWith("(ping = ")))
-        << "it measures the round trip";
+    // It measures the round trip; a second ping follows at once if the host was slow.
+    EXPECT_THAT(receive(), testing::AllOf(testing::Not(testing::IsEmpty()),
+                                          testing::Each(testing::StartsWith("(ping = "))));
     EXPECT_THAT(said_, testing::ElementsAre("greeted"));
     said_.clear();
   }

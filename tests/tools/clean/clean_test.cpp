@@ -110,7 +110,7 @@ TEST_F(CleanTest, RemovesAThousandLinksOfADeadClient) {
 
 // A dry run lists exactly the files that are then removed, and changes nothing.
 TEST_F(CleanTest, ADryRunReportsWhatWouldBeRemovedAndWhy) {
-  const EchoThread living(backplane_, "living");
+  const MessageServer living(backplane_, "living");
   leaveDeadPair();
   const auto before = files();
 

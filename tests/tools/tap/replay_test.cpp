@@ -2,6 +2,7 @@
 // `mpf replay`: sends recordings again, and reports what became of the requests.
 #include <sys/stat.h>
 
+#include <atomic>
 #include <filesystem>
 
 #include "tests/tools/tap/tap_fixture.h"
@@ -131,14 +132,19 @@ TEST_F(ReplayTest, ARequestWithoutAReplyIsAnErrorAlsoBesideASubscription) {
   }
   MessageServer server(backplane_, "echo");
   std::vector<Int32Message> kept;
+  std::atomic<int> taken{0};
   server.on<Int32>([&](Int32Message&& request) {
     kept.push_back(std::move(request));
     const std::vector<Int32> replies(3);
     if (kept.size() == 1) server.replyMany<Int32>(kept.front(), replies);
+    ++taken;
   });
   std::thread thread([&] { server.run(); });
 
-  const auto ended = run({"replay", file_, "--speed", "0", "--timeout", "2", "--json"});
+  Tool tool({"replay", file_, "--speed", "0", "--timeout", "1000", "--json"}, backplane_.name());
+  while (taken < 2) std::this_thread::yield();
+  tool.signal(SIGINT);
+  const auto ended = tool.end();
 
   server.interrupt();
   thread.join();
