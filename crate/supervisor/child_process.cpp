@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/syscall.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -131,6 +132,12 @@ std::string ChildProcess::open() {
   int why = 0;
   const auto length = retryInterrupted([&] { return ::read(failure_.get(), &why, sizeof why); });
   return length == sizeof why ? std::string(std::strerror(why)) : std::string();
+}
+
+std::optional<pid_t> endedChild() {
+  siginfo_t ended{};
+  if (::waitid(P_ALL, 0, &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid == 0) return {};
+  return ended.si_pid;
 }
 
 FileDescriptor openPidfd(pid_t pid) {

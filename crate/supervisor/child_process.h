@@ -13,6 +13,7 @@
 #include <sys/types.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include <mpf/file_descriptor.h>
@@ -40,6 +41,9 @@ class ChildProcess {
   FileDescriptor gate_;  // closes when the supervisor ends
   FileDescriptor failure_;  // errno of exec; the end of file when it succeeded
 };
+
+// A child that has ended and has not been reaped, if there is one.
+[[nodiscard]] std::optional<pid_t> endedChild();
 
 // A descriptor that becomes readable when the process ends; empty: there is no such process, or no
 // descriptor is free, or the kernel has no pidfd_open().

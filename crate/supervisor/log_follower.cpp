@@ -80,6 +80,16 @@ LogFollower::Log LogFollower::open(const std::string& path) const {
   return log;
 }
 
+// In a log that takes several reads the line is joined with the next one.
+void LogFollower::endLine(const std::string& name) {
+  const auto found = logs_.find(name);
+  if (found == logs_.end()) return;
+  auto& log = found->second;
+  if (!readBytes(log) || log.partial.empty() || log.partial.back() == '\n') return;
+  log.partial += '\n';
+  hasMore_ = true;
+}
+
 std::string LogFollower::takeLines() {
   std::array<char, 4096> events{};
   while (::read(events_.get(), events.data(), events.size()) > 0) continue;
@@ -123,7 +133,8 @@ std::string LogFollower::prefix(const std::string& name) const {
   return fmt::format("\x1b[{}m{}\x1b[0m | ", colour, name);
 }
 
-void LogFollower::readBytes(Log& log) {
+// Returns whether it has read the whole file.
+bool LogFollower::readBytes(Log& log) {
   std::array<char, 65536> bytes{};
   struct stat status{};
   if (::fstat(log.file.get(), &status) == 0 && status.st_size < log.offset) log.offset = 0;
@@ -135,6 +146,7 @@ void LogFollower::readBytes(Log& log) {
     log.partial.append(bytes.data(), static_cast<std::size_t>(length));
   }
   hasMore_ = hasMore_ || log.offset >= enough;
+  return log.offset < enough;
 }
 
 void LogFollower::readNew(const std::string& name, Log& log, std::string& to) {

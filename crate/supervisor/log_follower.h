@@ -51,6 +51,8 @@ class LogFollower {
   // Follows a log from its present end; it need not exist.
   //   throws  std::system_error; then it is not followed
   void add(const std::string& name, const std::string& path);
+  // The process has ended: what it has written last is a line, also without the end of one.
+  void endLine(const std::string& name);
   // Readable when a log has grown.
   [[nodiscard]] int descriptor() const noexcept { return events_.get(); }
   // Returns new lines, at most about a megabyte of each log; hasMore() tells whether others follow.
@@ -73,7 +75,7 @@ class LogFollower {
   [[nodiscard]] Log open(const std::string& path) const;
   [[nodiscard]] static bool isReplaced(const Log& log);
   void tryReopen(Log& log);
-  void readBytes(Log& log);
+  bool readBytes(Log& log);
   void readNew(const std::string& name, Log& log, std::string& to);
   static std::string takeWhole(Log& log);
   void limit(Log& log) const;

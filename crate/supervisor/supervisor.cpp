@@ -215,15 +215,16 @@ void Supervisor::handleSignals() {
   }
 }
 
-// Also reaps processes that are not of the crate: they were left by others.
+// Also reaps processes that are not of the crate: they were left by others. What a process of the
+// crate has left in its process group is killed; until it is reaped, no other group has its number.
 void Supervisor::reapChildren() {
-  int status = 0;
-  for (;;) {
-    const auto pid = ::waitpid(-1, &status, WNOHANG);
-    if (pid <= 0) return;
-    for (const auto& member : members_) {
-      if (member->service.pid() == pid) handleEnd(*member, {status});
-    }
+  while (const auto pid = endedChild()) {
+    const auto member =
+        std::ranges::find(members_, *pid, [](const auto& one) { return one->service.pid(); });
+    if (member != members_.end()) ::kill(-*pid, SIGKILL);
+    int status = 0;
+    ::waitpid(*pid, &status, 0);
+    if (member != members_.end()) handleEnd(**member, {status});
   }
 }
 
@@ -233,6 +234,7 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
   member.isAdopted = false;
   member.adopted.reset();
+  logs_.endLine(service.plan().name);
   attempt([&] { capsuleWriter_.look(); });
   const auto capsule = capsuleWriter_.collect(service, end);
   service.ended(end, Clock::nowNs());
@@ -376,6 +378,7 @@ void Supervisor::wait() {
 // After act(): a process that still waits needs one that is not ready.
 void Supervisor::reportStatus() {
   if (ServiceManager::watchdogTime()) ServiceManager::notifyAlive();
+  if (isShuttingDown_) ServiceManager::notifyStillStopping();
   std::size_t ready = 0;
   bool isSettled = true;
   std::string others;

@@ -66,6 +66,22 @@ TEST_F(LogFollowerTest, ReturnsWholeLinesFromItsBeginning) {
   EXPECT_EQ(follower.takeLines(), "");
 }
 
+TEST_F(LogFollowerTest, TheEndOfTheProcessEndsItsLastLine) {
+  LogFollower follower(false, 1u << 20);
+  follower.add("dac", path_);
+  append(path_, "one\nlast wor");
+  EXPECT_EQ(follower.takeLines(), "dac | one\n");
+  append(path_, "ds");
+
+  follower.endLine("dac");
+
+  EXPECT_TRUE(follower.hasMore());
+  append(path_, "of the next\n");
+  EXPECT_EQ(follower.takeLines(), "dac | last words\ndac | of the next\n");
+  follower.endLine("dac");
+  EXPECT_FALSE(follower.hasMore());
+}
+
 TEST_F(LogFollowerTest, ALogThatCouldNotBeOpenedCanBeAddedLater) {
   append(path_, "before\n");
   LogFollower follower(false, 1u << 20);
