@@ -49,6 +49,7 @@ std::vector<ProgramKind> makeKinds() {
                    withHardware({{"timeout", {}},
                                  {"max-timeout", {}},
                                  {"max-lease", {}},
+                                 {"poll-timeout", {}},
                                  {"ti9914", {"module", "carrier", "site", "vector"}},
                                  {"meter", {"address", "wire"}}}),
                    true});

@@ -63,11 +63,11 @@ GpibResult GpibBoardController::check(const GpibAddress& address) const {
   return {};
 }
 
-// Ends an operation: the bus has no talker and no listeners afterwards.
+// Ends an operation: the bus has no talker and no listeners afterwards. If that fails, the
+// instruments have sent or received everything nevertheless; the next operation will fail.
 template <class Result>
 Result GpibBoardController::close(Result result, Bytes closing, Deadline deadline) {
-  if (result.ok()) static_cast<GpibResult&>(result) = command(closing, deadline);
-  if (!result.ok()) recover(closing);
+  if (!result.ok() || !command(closing, deadline).ok()) recover(closing);
   return result;
 }
 

@@ -23,6 +23,8 @@ struct GpibLimits {
   std::chrono::milliseconds timeout{3000};  // of requests with timeout 0
   std::chrono::milliseconds maxTimeout{60'000};
   std::chrono::milliseconds maxLease{60'000};
+  // Of a poll after a service request; longer than the way to the controller and back.
+  std::chrono::milliseconds pollTimeout{100};
 };
 
 struct GpibRequest {

@@ -24,7 +24,7 @@ GpibServer::GpibServer(MessageServer& server, GpibBus& bus, const GpibLimits& li
       bus_(bus),
       limits_(limits),
       log_(log),
-      subscriptions_(server, bus, log, [this] { queue_.wake(); }) {
+      subscriptions_(server, bus, log, limits.pollTimeout, [this] { queue_.wake(); }) {
   server.on<Char8Array>([this](Char8ArrayMessage&& message) { handle(std::move(message)); });
   answerOtherTypes<Char8Array>(server, [this](MessageType type) {
     log_->debug("a request of type {}: status -1", toString(type));

@@ -12,15 +12,19 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPollLimit{100};  // of one instrument
 constexpr milliseconds kFirstPause{20};
 constexpr milliseconds kLongestPause{1000};
 
 }  // namespace
 
 ServiceSubscriptions::ServiceSubscriptions(MessageServer& server, GpibBus& bus,
-                                           const ServerLog& log, std::function<void()> requested)
-    : server_(server), bus_(bus), log_(log), requested_(std::move(requested)) {}
+                                           const ServerLog& log, milliseconds pollTimeout,
+                                           std::function<void()> requested)
+    : server_(server),
+      bus_(bus),
+      log_(log),
+      pollTimeout_(pollTimeout),
+      requested_(std::move(requested)) {}
 
 // ---- the server's thread
 
@@ -100,7 +104,7 @@ void ServiceSubscriptions::pollInstruments(GpibUser holder) {
   }
   const auto address = round_.back();
   round_.pop_back();
-  const auto poll = bus_.serialPoll(address, Deadline::after(kPollLimit), holder);
+  const auto poll = bus_.serialPoll(address, Deadline::after(pollTimeout_), holder);
   if (poll.ok()) {
     isFound_ = isFound_ || (poll.statusByte & kGpibRequestsService) != 0;
     report(address, poll.statusByte);

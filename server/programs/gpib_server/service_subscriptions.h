@@ -29,9 +29,10 @@ namespace mpf {
 class ServiceSubscriptions {
  public:
   //   server, bus, log  must outlive this
+  //   pollTimeout       of one instrument
   //   requested         called when pollInstruments() has something to do, on a thread of the bus
   ServiceSubscriptions(MessageServer& server, GpibBus& bus, const ServerLog& log,
-                       std::function<void()> requested);
+                       std::chrono::milliseconds pollTimeout, std::function<void()> requested);
 
   // Replies to `request` and begins its subscription.
   void add(Char8ArrayMessage&& request, GpibAddress address);
@@ -61,6 +62,7 @@ class ServiceSubscriptions {
   MessageServer& server_;
   GpibBus& bus_;
   const ServerLog& log_;
+  const std::chrono::milliseconds pollTimeout_;
   const std::function<void()> requested_;
   mutable std::mutex mutex_;
   std::vector<Subscription> subscriptions_;  // under mutex_

@@ -32,6 +32,9 @@ std::optional<int> GpibStartOptions::parse(int argc, char** argv) {
   addTime(app, "--max-timeout", limits.maxTimeout,
           "Longest time that one request may wait and use the bus", kLimit);
   addTime(app, "--max-lease", limits.maxLease, "Longest lease of the bus by one client", kLimit);
+  addTime(app, "--poll-timeout", limits.pollTimeout,
+          "Timeout of the serial poll of an instrument after a service request",
+          {.least = std::chrono::milliseconds(1), .most = kLimit.most});
   ti9914.addTo(app);
   hardware.addTo(app);
   app.get_option("--wait")->description("Start even if the controller is missing, and wait for it");

@@ -118,9 +118,20 @@ TEST_F(BoardControllerTest, RecoversAfterAFailureOfEachStep) {
   board_.failAt("send hi END");
   EXPECT_EQ(board_.write({22}, kData, true, never_).status, GpibStatus::timeout);
   EXPECT_EQ(board_.takeLog(), "5f 3f 36|send hi END|recover 5f 3f");
+}
+
+// For example at the deadline: a status byte or an answer that was read is not lost.
+TEST_F(BoardControllerTest, WhatWasExchangedStaysValidIfTheEndOfTheOperationFails) {
   board_.failAt("5f 3f");
-  EXPECT_EQ(board_.write({22}, kData, true, never_).status, GpibStatus::timeout);
+  EXPECT_TRUE(board_.write({22}, kData, true, never_).ok());
   EXPECT_EQ(board_.takeLog(), "5f 3f 36|send hi END|5f 3f|recover 5f 3f");
+  EXPECT_EQ(board_.read({22}, {.maxBytes = 7}, never_).data.size(), 1U);
+  EXPECT_EQ(board_.takeLog(), "5f 3f 56|receive 7|5f 3f|recover 5f 3f");
+  board_.failAt("19 5f 3f");
+  const auto poll = board_.serialPoll({22}, never_);
+  EXPECT_TRUE(poll.ok());
+  EXPECT_EQ(poll.statusByte, 'R');
+  EXPECT_EQ(board_.takeLog(), "5f 3f 18 56|receive 1|19 5f 3f|recover 19 5f 3f");
 }
 
 TEST_F(BoardControllerTest, RecoversFromAFailedReadWithItsData) {

@@ -53,7 +53,7 @@ TEST_F(GpibProgramTest, ServesTheInstrumentsOfItsBusUntilSigterm) {
 }
 
 TEST_F(GpibProgramTest, AServiceRequestReachesSubscribers) {
-  const auto server = start();
+  const auto server = start({"--poll-timeout", "10min"});
   GpibAsker asker(backplane_, "GPIB0");
   ASSERT_EQ(asker.ask({.timeout = 60, .cmd = cmdSubscribe, .address = 22}).status, gpibStatusOK);
 

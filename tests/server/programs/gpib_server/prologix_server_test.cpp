@@ -21,10 +21,10 @@ class PrologixServerTest : public testing::Test {
  protected:
   PrologixServerTest() {
     stand_.model.attach({kMeter}, std::make_shared<MeterModel>());
-    std::thread plugging([this] { stand_.plugIn(); });
+    const std::jthread plugging([this] { stand_.plugIn(); });
     bus_ = std::make_unique<GpibBus>(openPrologix({.address = stand_.address()}));
-    plugging.join();
-    served_ = std::make_unique<GpibServer>(server_, *bus_, GpibLimits{}, log_);
+    served_ = std::make_unique<GpibServer>(
+        server_, *bus_, GpibLimits{.pollTimeout = std::chrono::minutes(10)}, log_);
     served_->start([] { FAIL() << "the server failed"; });
   }
   static Char8Array fieldsOf(std::int32_t cmd, std::int32_t address) {

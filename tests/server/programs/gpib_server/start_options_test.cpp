@@ -24,9 +24,10 @@ class GpibStartOptionsTest : public testing::Test {
 };
 
 TEST_F(GpibStartOptionsTest, TheArgumentsAreThoseOfTheOldCommand) {
-  ASSERT_EQ(parse({"GPIB0", "a-ip488", "1024", "1000", "--ti9914", "a-ip488,ipac,IP_a,105",
-                   "--timeout", "5", "--max-timeout", "6s", "--max-lease", "1500ms"}),
-            std::nullopt);
+  ASSERT_EQ(
+      parse({"GPIB0", "a-ip488", "1024", "1000", "--ti9914", "a-ip488,ipac,IP_a,105", "--timeout",
+             "5", "--max-timeout", "6s", "--max-lease", "1500ms", "--poll-timeout", "250ms"}),
+      std::nullopt);
 
   EXPECT_EQ(options_.server, "GPIB0");
   EXPECT_EQ(options_.module, "a-ip488");
@@ -35,6 +36,7 @@ TEST_F(GpibStartOptionsTest, TheArgumentsAreThoseOfTheOldCommand) {
   EXPECT_EQ(options_.limits.timeout, 5s);
   EXPECT_EQ(options_.limits.maxTimeout, 6s);
   EXPECT_EQ(options_.limits.maxLease, 1500ms);
+  EXPECT_EQ(options_.limits.pollTimeout, 250ms);
   EXPECT_NE(options_.ti9914.find("a-ip488"), nullptr);
 }
 
