@@ -38,8 +38,7 @@ TEST_F(ClientTest, ADescriptorWakesAnEventLoop) {
 TEST_F(ClientTest, AThreadOfAnEventLoopIsWokenForAnEarlierDeadline) {
   auto& server = startServer();
   bind();
-  while (dispatcher_.runOnce(Deadline::after(1ms))) {
-  }
+  runUntil([&] { return dispatcher_.nextDeadline().isNever(); });
   pollfd descriptor{dispatcher_.descriptor(), POLLIN, 0};
   std::thread([&] {
     while (!dispatcher_.runPending()) {

@@ -152,7 +152,10 @@ class Interop(unittest.TestCase):
         return program
 
     def call(self, *words, parties=()):
-        program = self.program(MPF, "call", "echo", *words, "--backplane", self.backplane)
+        patience = () if "--timeout" in words else ("--timeout", "600")
+        program = self.program(
+            MPF, "call", "echo", *words, *patience, "--backplane", self.backplane
+        )
         return program.rest(*parties)
 
     def old_client(self, **fields):

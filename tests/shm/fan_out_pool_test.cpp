@@ -4,6 +4,7 @@
 
 #include <sys/stat.h>
 
+#include <barrier>
 #include <optional>
 #include <thread>
 #include <vector>
@@ -116,13 +117,16 @@ TEST_F(FanOutPoolTest, FindsTheChunkOfAnAddress) {
 }
 
 TEST_F(FanOutPoolTest, ThreadsNeverGetTheSameChunk) {
-  const auto fill = [this](std::uint8_t mark) {
-    for (int i = 0; i < 2000; ++i) {
+  std::barrier start(2);
+  const auto fill = [&](std::uint8_t mark) {
+    start.arrive_and_wait();
+    for (int i = 0; i < 20'000; ++i) {
       const auto chunk = pool_->tryAlloc(100);
       ASSERT_TRUE(chunk);
       auto* const bytes = reinterpret_cast<std::uint8_t*>(chunk->data());
       bytes[0] = mark;
       bytes[99] = mark;
+      if (i % 100 == 0) std::this_thread::yield();
       ASSERT_EQ(bytes[0], bytes[99]);
       chunk->drop();
     }

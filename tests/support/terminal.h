@@ -162,6 +162,8 @@ class Terminal {
   bool readMore() {
     std::array<pollfd, 2> ready{{{master_.get(), POLLIN, 0}, {process_.get(), POLLIN, 0}}};
     checkCall(retryInterrupted([&] { return ::poll(ready.data(), ready.size(), -1); }), "poll");
+    // The program may have written its last output after poll() had looked at the terminal.
+    if (ready[0].revents == 0) ::poll(ready.data(), 1, 0);
     if ((ready[0].revents & POLLIN) == 0) return false;
     std::array<char, 4096> bytes{};
     const auto got = ::read(master_.get(), bytes.data(), bytes.size());
