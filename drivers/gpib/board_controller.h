@@ -11,8 +11,8 @@
 //   goToLocal   UNT UNL LAG GTL          │         │ UNT UNL
 //
 // LAG and TAG stand for the primary and, if there is one, the secondary address. After a failure
-// recover() is called in place of the last column. If the last column fails, recover() is called, and
-// the result is that of the columns before it.
+// recover() is called in place of the last column. If the last column itself fails, recover() is
+// called, too, and the result is that of the columns before it.
 //
 // Threads  as GpibController.
 // Source   IEEE 488.1; the manual's gpibSniff for the order UNT, UNL, TAG.
