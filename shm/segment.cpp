@@ -266,6 +266,13 @@ void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::S
            const std::string& path) {
   if (header.magic != layout::kMagic)
     throw SegmentError(fmt::format("{}: not a segment of MPF (wrong magic number)", path));
+  // Before the version: the kind is at the same place in all versions, so a header with another one
+  // is spoiled, not of another version.
+  if (header.kind != kind) {
+    throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path,
+                                   static_cast<std::uint32_t>(header.kind),
+                                   static_cast<std::uint32_t>(kind)));
+  }
   if (header.layoutMajor < layout::kOldestMajor || header.layoutMajor > layout::kMajor) {
     const auto supported = layout::kOldestMajor == layout::kMajor
                                ? fmt::to_string(layout::kMajor)
@@ -274,11 +281,6 @@ void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::S
         fmt::format("{}: layout version {}; this program supports {}; restart all processes of the "
                     "backplane with the same release of MPF",
                     path, header.layoutMajor, supported));
-  }
-  if (header.kind != kind) {
-    throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path,
-                                   static_cast<std::uint32_t>(header.kind),
-                                   static_cast<std::uint32_t>(kind)));
   }
   if (header.totalBytes < layout::kHeaderBytes || fileBytes < header.totalBytes) {
     throw SegmentError(

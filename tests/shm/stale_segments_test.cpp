@@ -174,6 +174,14 @@ TEST_F(StaleSegmentsTest, TheHintsOfAClientTellWhichVersionItsWindowHas) {
   EXPECT_EQ(backplane_.removeDead().size(), 2U);
 }
 
+TEST_F(StaleSegmentsTest, AWindowOfAnotherVersionAndAnotherKindIsSpoiled) {
+  const auto window = keyed(NameKind::clientWindow, 7);
+  leave(window, SegmentKind::link, 0, layout::kMajor + 1);
+
+  EXPECT_EQ(judgementOf(window).verdict, Verdict::dead);
+  EXPECT_EQ(backplane_.removeDead().size(), 1U);
+}
+
 // A successor gets the name after the file was judged dead. The removal checks the lock again.
 TEST_F(StaleSegmentsTest, DoesNotRemoveASuccessorOfTheSameName) {
   leave(serverName(), SegmentKind::serverWindow, 0);
