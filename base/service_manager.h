@@ -14,8 +14,8 @@ class ServiceManager {
   static void notifyReady() noexcept { notify("READY=1"); }
   static void notifyReloading() noexcept;
   static void notifyStopping() noexcept { notify("STOPPING=1"); }
-  // The program still stops; to be repeated within 30 s, or systemd kills it when TimeoutStopSec=
-  // has passed.
+  // The program is still stopping. After TimeoutStopSec=, systemd kills it unless this came within
+  // the last 30 s.
   static void notifyStillStopping() noexcept { notify("EXTEND_TIMEOUT_USEC=30000000"); }
   // One line that `systemctl status` shows.
   static void notifyStatus(const std::string& status) noexcept { notify("STATUS=" + status); }

@@ -80,7 +80,7 @@ LogFollower::Log LogFollower::open(const std::string& path) const {
   return log;
 }
 
-// In a log that takes several reads the line is joined with the next one.
+// If the log has more new bytes than one call reads, its last line is joined with the next one.
 void LogFollower::endLine(const std::string& name) {
   const auto found = logs_.find(name);
   if (found == logs_.end()) return;

@@ -51,7 +51,7 @@ class LogFollower {
   // Follows a log from its present end; it need not exist.
   //   throws  std::system_error; then it is not followed
   void add(const std::string& name, const std::string& path);
-  // The process has ended: what it has written last is a line, also without the end of one.
+  // The process has ended: what it wrote last is a whole line, also without a newline.
   void endLine(const std::string& name);
   // Readable when a log has grown.
   [[nodiscard]] int descriptor() const noexcept { return events_.get(); }

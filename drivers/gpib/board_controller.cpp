@@ -64,7 +64,7 @@ GpibResult GpibBoardController::check(const GpibAddress& address) const {
 }
 
 // Ends an operation: the bus has no talker and no listeners afterwards. If that fails, the
-// instruments have sent or received everything nevertheless; the next operation will fail.
+// instruments have sent or received everything nevertheless, and the result stays.
 template <class Result>
 Result GpibBoardController::close(Result result, Bytes closing, Deadline deadline) {
   if (!result.ok() || !command(closing, deadline).ok()) recover(closing);

@@ -120,14 +120,15 @@ TEST_F(FanOutPoolTest, ThreadsNeverGetTheSameChunk) {
   std::barrier start(2);
   const auto fill = [&](std::uint8_t mark) {
     start.arrive_and_wait();
-    for (int i = 0; i < 20'000; ++i) {
+    for (int i = 0; i < 100'000; ++i) {
       const auto chunk = pool_->tryAlloc(100);
       ASSERT_TRUE(chunk);
       auto* const bytes = reinterpret_cast<std::uint8_t*>(chunk->data());
       bytes[0] = mark;
       bytes[99] = mark;
       if (i % 100 == 0) std::this_thread::yield();
-      ASSERT_EQ(bytes[0], bytes[99]);
+      ASSERT_EQ(bytes[0], mark);
+      ASSERT_EQ(bytes[99], mark);
       chunk->drop();
     }
   };

@@ -142,9 +142,8 @@ TEST_F(RouterViewTest, RemovesControlCharactersFromTexts) {
 TEST_F(RouterViewTest, WaitsForTheEndOfAHalfWrittenText) {
   router::Statistics statistics(backplane_, "lab1");
   const auto remote = test::lostRemote(statistics, "whole");
-  auto& line = *remote->operator->();
   const auto write = [&](const std::string& text) {
-    std::ranges::copy(text + '\0', line.problem.begin());
+    std::ranges::copy(text + '\0', (*remote)->problem.begin());
   };
   const auto wait = [] {
     const auto begin = Clock::nowNs();
@@ -155,11 +154,11 @@ TEST_F(RouterViewTest, WaitsForTheEndOfAHalfWrittenText) {
   std::thread writer([&] {
     for (int i = 0; !done; ++i) {
       const auto begin = Clock::nowNs();
-      line.texts.fetch_add(1);
+      (*remote)->texts.fetch_add(1);
       write("half " + std::to_string(i));
       wait();
       write("whole");
-      line.texts.fetch_add(1);
+      (*remote)->texts.fetch_add(1);
       if (Clock::nowNs() - begin > Nanoseconds(100us).count()) ++standstills;
       wait();
     }
