@@ -3,8 +3,6 @@
 
 #include <sched.h>
 
-#include <algorithm>
-#include <kj/common.h>
 #include <utility>
 
 #include <mpf/clock.h>
@@ -26,41 +24,19 @@ void Polling::noteTraffic() {
   idleTurns_ = 0;
   if (isPolling_ || processor_.plan() == SharedProcessor::Plan::keep) return;
   isPolling_ = true;
+  writes_.setDriven(true);
   tasks_.add(nextTurn());
 }
 
-void Polling::add(Polled& window) {
-  noteTraffic();
-  // A window that is not added wakes the event loop by its descriptor. While add() drops the oldest
-  // window, that window's last poll() may call add().
-  if (!isPolling_ || isReplacing_) return;
-  if (!windows_.empty() && windows_.back() == &window) return;
-  if (const auto found = std::ranges::find(windows_, &window); found != windows_.end()) {
-    std::rotate(found, found + 1, windows_.end());
-    return;
-  }
-  if (windows_.size() == kMaxWindows) {
-    auto& oldest = *windows_.front();
-    windows_.erase(windows_.begin());
-    isReplacing_ = true;
-    KJ_DEFER(isReplacing_ = false);
-    drop(oldest);
-  }
-  windows_.push_back(&window);
-  window.setPolled(true);
-}
-
-void Polling::remove(Polled& window) noexcept { std::erase(windows_, &window); }
-
-void Polling::drop(Polled& window) {
-  window.setPolled(false);
-  window.poll();
+void Polling::remove(Polled& polled) noexcept {
+  lines_.remove(polled);
+  windows_.remove(polled);
 }
 
 // afterDelay(0): the event loop first runs all tasks that are ready and looks at its descriptors.
 // afterReadyTasks(): the turn runs after the handlers of what the descriptors have brought. Of the
-// calls of afterReadyTasks() the newest one resolves first: writes to the lines, which are newer,
-// run before the turn.
+// calls of afterReadyTasks() the newest one resolves first: writes that were due when the polling
+// began run before the first turn.
 kj::Promise<void> Polling::nextTurn() {
   auto& timer = port_.getTimer();
   return timer.afterDelay(0 * kj::NANOSECONDS)
@@ -69,6 +45,7 @@ kj::Promise<void> Polling::nextTurn() {
 }
 
 kj::Promise<void> Polling::loop() {
+  writes_.run();  // before others get the processor
   const auto nowNs = Clock::nowNs();
   ++idleTurns_;
   hasLooked_ = false;
@@ -76,7 +53,9 @@ kj::Promise<void> Polling::loop() {
     end();
     return kj::READY_NOW;
   }
-  pollWindows();
+  lines_.poll();
+  windows_.poll();
+  writes_.run();
   return nextTurn();
 }
 
@@ -85,14 +64,10 @@ void Polling::lookForAnswers() {
   isCrowded_ = !tryYield(Clock::nowNs());
   // An error of a window does not concern the line that calls.
   tasks_.add(kj::evalNow([this]() -> kj::Promise<void> {
-    pollWindows();
+    windows_.poll();
+    writes_.run();
     return kj::READY_NOW;
   }));
-}
-
-void Polling::pollWindows() {
-  // NOLINTNEXTLINE(modernize-loop-convert): the call may add or remove a window
-  for (std::size_t at = 0; at < windows_.size(); ++at) windows_[at]->poll();
 }
 
 // Returns false if others use the processor for long: then a wake-up is earlier than the next turn.
@@ -103,15 +78,13 @@ bool Polling::tryYield(std::int64_t nowNs) {
   return !SharedProcessor::isLong(yieldNs);
 }
 
-// The last look at the windows may start to poll them again, or remove others.
 void Polling::end() {
   isPolling_ = false;
   hasLooked_ = isCrowded_ = false;
-  for (auto left = windows_.size(); left != 0 && !windows_.empty(); --left) {
-    auto& window = *windows_.front();
-    windows_.erase(windows_.begin());
-    drop(window);
-  }
+  lines_.clear();
+  windows_.clear();
+  // The last look into a window may have begun to poll again.
+  writes_.setDriven(isPolling_);
 }
 
 }  // namespace mpf::router

@@ -22,7 +22,6 @@ constexpr auto kPendingBindsRetryDelay = std::chrono::seconds(1);  // when not a
 
 Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log)
     : statistics_(Backplane::attach(config.backplane), config.name),
-      polling_(io.unixEventPort),
       context_{.port = io.unixEventPort,
                .network = io.provider->getNetwork(),
                .timer = io.provider->getTimer(),
@@ -34,6 +33,7 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& lo
                .tls = nullptr,
                .incarnation = segments::newIncarnation(),
                .polling = &polling_},
+      polling_(io.unixEventPort, context_.writes),
       monitors_(context_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
       pendingBinds_(context_.backplane),
       bell_(io.unixEventPort, [this] { readPendingBindsSoon(); }),

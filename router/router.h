@@ -66,8 +66,8 @@ class Router final : private kj::TaskSet::ErrorHandler {
   };
 
   Statistics statistics_;
-  Polling polling_;
   RouterContext context_;
+  Polling polling_;
   ServerMonitors monitors_;
   PendingBinds pendingBinds_;
   Bell bell_;

@@ -32,13 +32,14 @@ struct RouterContext {
   std::shared_ptr<Tls> tls;       // nullptr: no connection uses TLS
   std::uint64_t incarnation = 0;  // distinguishes restarts of this router
   Polling* polling = nullptr;     // nullptr: the router sleeps at once
+  DueWrites writes{timer};
 
   // As the functions of Polling.
   void noteTraffic() const {
     if (polling != nullptr) polling->noteTraffic();
   }
   void poll(Polled& window) const {
-    if (polling != nullptr) polling->add(window);
+    if (polling != nullptr) polling->addWindow(window);
   }
   void lookForAnswers() const {
     if (polling != nullptr) polling->lookForAnswers();

@@ -116,7 +116,6 @@ void FarClients::run() {
 
 void FarClients::onTraffic() {
   if (dispatcher_) context_.poll(*this);
-  else context_.noteTraffic();
 }
 
 // Runs the dispatcher also when one of its deadlines is due.

@@ -13,7 +13,9 @@ ServerRouter::ServerRouter(RouterContext& context, kj::Own<kj::AsyncIoStream> st
       peer_(peer),
       address_(address),
       record_(context.statistics.add(layout::RouterRole::server)),
-      line_(kj::mv(stream), context.timer, context.config.limits, *record_, lineEvents()),
+      line_(kj::mv(stream), isTls ? Security::tls : Security::plain,
+            {context.timer, context.writes, context.polling}, context.config.limits, *record_,
+            lineEvents()),
       servers_(context, line_, *record_, peer, address) {
   record_->setAddress(address);
   record_->setState(layout::RouterLineState::connecting);

@@ -70,14 +70,15 @@ kj::Promise<LineEnd> ClientRouter::runOnce() {
 kj::Promise<LineEnd> ClientRouter::runLine(kj::Own<kj::AsyncIoStream> stream) {
   if (state_ == State::stopping) return LineEnd{"the router is stopping"};
   line_ = std::make_unique<Line>(
-      kj::mv(stream), context_.timer, context_.config.limits, *record_,
+      kj::mv(stream), remote_.security,
+      Line::Loop{context_.timer, context_.writes, context_.polling}, context_.config.limits,
+      *record_,
       Line::Events{
           .onGreeting = [this](const PeerGreeting& greeting) { onGreeting(greeting); },
           .onItem = [this](wire::Item::Reader item) { servers_.handle(item); },
           .onPlain = [this](PlainItem& item) { servers_.handle(item); },
           .onPlainItems = [this](const PlainItems& items) { servers_.handle(items); },
           .onRoom = [this] { servers_.pump(); },
-          .onTraffic = [this] { context_.noteTraffic(); },
           .onHandled = [this] { context_.lookForAnswers(); },
           .onUnsendable = [this](const Carried& request, const std::string& why,
                                  wire::Item::Builder) { servers_.refuse(request, why); },

@@ -122,7 +122,10 @@ bool Proxy::pump(int most) {
       most -= static_cast<int>(run_.size());
     }
   }
-  if (hasTaken) context_.poll(*this);
+  if (hasTaken) {
+    context_.noteTraffic();
+    context_.poll(*this);
+  }
   return hasMore();
 }
 

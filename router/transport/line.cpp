@@ -7,7 +7,6 @@
 
 #include <mpf/clock.h>
 
-#include "router/after_ready_tasks.h"
 #include "router/transport/kj_text.h"
 #include "router/transport/tls.h"
 #include "shm/histogram.h"
@@ -17,22 +16,30 @@ namespace {
 
 constexpr std::int64_t kTurnNs = 2'000'000;  // longest turn with the items of one peer
 
+constexpr std::size_t kMostAtOnce = std::size_t{256} << 10;  // bytes read by one poll()
+
 constexpr const char* kTlsOnPlain =
     "the peer uses TLS, this side of the connection plain TCP: set the same security, \"tls\" or "
     "\"plain\", at both routers";
 
 }  // namespace
 
-Line::Line(kj::Own<kj::AsyncIoStream> stream, kj::Timer& timer, const Limits& limits,
-           PeerRecord& record, Events events)
+Line::Line(kj::Own<kj::AsyncIoStream> stream, Security security, const Loop& loop,
+           const Limits& limits, PeerRecord& record, Events events)
     : stream_(kj::mv(stream)),
-      timer_(timer),
+      direct_(security == Security::plain ? DirectIo(*stream_) : DirectIo()),
+      loop_(loop),
       limits_(limits),
       record_(record),
       events_(std::move(events)),
       reader_(kLeastFrameBytes),
-      queue_(limits.queueSize, record),
+      writer_(*this, *stream_, direct_, loop.writes, {limits.queueSize, record},
+              events_.onUnsendable),
       keepAlive_(limits) {}
+
+Line::~Line() {
+  if (loop_.polling != nullptr) loop_.polling->remove(*this);
+}
 
 // ---- start and end
 
@@ -41,18 +48,21 @@ kj::Promise<LineEnd> Line::run(FillItem greeting) {
   ended_ = kj::mv(paf.fulfiller);
   keepAlive_.start(Clock::nowNs());
   send(std::move(greeting));
-  reads_ = watched(&Line::readLoop);
-  liveness_ = watched(&Line::livenessLoop);
+  reads_ = watched([this] { return readLoop(); });
+  liveness_ = watched([this] { return livenessLoop(); });
   return kj::mv(paf.promise);
 }
 
 // Any exception from a loop ends the line. A loop may also throw before it returns its promise,
 // when the peer has closed the connection already.
-kj::Promise<void> Line::watched(kj::Promise<void> (Line::*loop)()) {
-  return kj::evalNow([&] { return (this->*loop)(); })
-      .eagerlyEvaluate([this](kj::Exception&& error) {
-        finish({farewell_.empty() ? tlsProblem(error) : farewell_});
-      });
+kj::Promise<void> Line::watched(kj::Function<kj::Promise<void>()> loop) {
+  return kj::evalNow([&] { return loop(); }).eagerlyEvaluate([this](kj::Exception&& error) {
+    onReadFailure(error);
+  });
+}
+
+void Line::onReadFailure(const kj::Exception& error) {
+  finish({farewell_.empty() ? tlsProblem(error) : farewell_});
 }
 
 void Line::end(FarewellCode code, const std::string& why) {
@@ -68,7 +78,7 @@ void Line::end(FarewellCode code, const std::string& why) {
 }
 
 void Line::finishLater(const std::string& why) {
-  farewellTimer_ = timer_.afterDelay(kFarewellTime)
+  farewellTimer_ = loop_.timer.afterDelay(kFarewellTime)
                        .then([this, why] { finish({why}); })
                        .eagerlyEvaluate(nullptr);
 }
@@ -80,20 +90,59 @@ void Line::finish(LineEnd end) {
 
 // ---- reading
 
+// Leaves the next bytes to poll() while the line is polled. A read that has begun is never given
+// up for this: it may have taken bytes from the stream already.
 kj::Promise<void> Line::readLoop() {
+  pollReads_ = isPolled_;
+  if (pollReads_) return kj::READY_NOW;
   auto room = reader_.room();
-  return stream_->tryRead(room.begin(), 1, room.size())
-      .then([this](std::size_t bytes) -> kj::Promise<void> {
-        if (bytes == 0) {
-          finish({farewell_.empty() ? closedReason() : farewell_});
-          return kj::READY_NOW;
-        }
-        if (discardsInput()) return readAndDiscard();
-        count(record_->bytesReceived, bytes);
-        keepAlive_.bytesReceived(bytes);
-        reader_.filled(bytes);
-        return handleReceived();
-      });
+  return stream_->tryRead(room.begin(), 1, room.size()).then([this](std::size_t bytes) {
+    return proceed(received(bytes));
+  });
+}
+
+void Line::poll() {
+  if (!std::exchange(pollReads_, false)) return;
+  KJ_IF_MAYBE (error, kj::runCatchingExceptions([this] { readDirectly(); })) onReadFailure(*error);
+}
+
+void Line::setPolled(bool isPolled) {
+  isPolled_ = isPolled;
+  if (!isPolled && std::exchange(pollReads_, false))
+    reads_ = watched([this] { return readLoop(); });
+}
+
+void Line::readDirectly() {
+  auto next = Next::read;
+  for (std::size_t total = 0; next == Next::read && total < kMostAtOnce;) {
+    const auto room = reader_.room();
+    const auto bytes = direct_.tryRead(room);
+    if (bytes) next = received(*bytes);
+    if (bytes != room.size()) break;
+    total += *bytes;
+  }
+  pollReads_ = next == Next::read && isPolled_;
+  if (!pollReads_) reads_ = watched([this, next] { return proceed(next); });
+}
+
+// Returns what follows.
+Line::Next Line::received(std::size_t bytes) {
+  if (bytes == 0) {
+    finish({farewell_.empty() ? closedReason() : farewell_});
+    return Next::nothing;
+  }
+  if (discardsInput()) return Next::discard;
+  count(record_->bytesReceived, bytes);
+  keepAlive_.bytesReceived(bytes);
+  reader_.filled(bytes);
+  return handleReceived();
+}
+
+kj::Promise<void> Line::proceed(Next next) {
+  if (next == Next::nothing) return kj::READY_NOW;
+  if (next == Next::discard) return readAndDiscard();
+  return whenAnswersAreSent().then(
+      [this, next] { return next == Next::read ? readLoop() : proceed(handleReceived()); });
 }
 
 std::string Line::closedReason() const {
@@ -115,10 +164,10 @@ kj::Promise<void> Line::readAndDiscard() {
   });
 }
 
-// Handles the received items, in turns of at most kTurnNs. Continues with the next turn when the
-// peer has read enough of the answers.
-kj::Promise<void> Line::handleReceived() {
-  if (discardsInput()) return readAndDiscard();
+// Handles the received items, for at most kTurnNs. The next turn follows when the peer has read
+// enough of the answers.
+Line::Next Line::handleReceived() {
+  if (discardsInput()) return Next::discard;
   bool isDone = false;
   try {
     isDone = handleSome();
@@ -131,15 +180,14 @@ kj::Promise<void> Line::handleReceived() {
     // Not caused by the peer: no memory or no descriptor is left.
     end(FarewellCode::STOPPING, error.what());
   }
-  if (discardsInput()) return readAndDiscard();
+  if (discardsInput()) return Next::discard;
   if (std::exchange(hasHandled_, false) && events_.onHandled) events_.onHandled();
-  return whenAnswersAreSent().then(
-      [this, isDone] { return isDone ? readLoop() : handleReceived(); });
+  return isDone ? Next::read : Next::handle;
 }
 
 kj::Promise<void> Line::whenAnswersAreSent() {
   // Let the other tasks of the event loop run, first of all the one that writes the answers.
-  if (!queue_.hasMaxAnswers()) return timer_.afterDelay(0 * kj::NANOSECONDS);
+  if (!queue().hasMaxAnswers()) return loop_.timer.afterDelay(0 * kj::NANOSECONDS);
   auto paf = kj::newPromiseAndFulfiller<void>();
   resumeReading_ = kj::mv(paf.fulfiller);
   return kj::mv(paf.promise);
@@ -154,7 +202,7 @@ bool Line::handleSome() {
   KJ_DEFER(origin_ = SendQueue::Origin::own);
   NoticeBatch notices;
   capnp::uint handled = 0;  // items and frames, since the last look
-  while (!queue_.hasMaxAnswers()) {
+  while (!queue().hasMaxAnswers()) {
     if (handled >= kItemsPerCheck) {
       if (Clock::nowNs() >= endNs) return false;
       handled = 0;
@@ -186,7 +234,7 @@ bool Line::tryNextFrame() {
   if (frame == nullptr) return false;
   keepAlive_.frameReceived(Clock::nowNs());
   count(record_->framesReceived);
-  if (events_.onTraffic) events_.onTraffic();
+  noteTraffic();
   items_ = frame->getRoot<wire::Frame>().getItems();
   nextItem_ = 0;
   plain_.reset();
@@ -262,70 +310,58 @@ void Line::takeGreeting(wire::Greeting::Reader greeting) {
 // ---- writing
 
 void Line::send(FillItem fill) {
-  if (!isEnding()) enqueue(std::move(fill), origin_);
+  if (!isEnding()) writer_.push(std::move(fill), origin_);
 }
 
 void Line::send(Carried carried) {
-  if (isEnding()) queue_.reject(std::move(carried));
-  else enqueue(std::move(carried));
+  if (isEnding()) queue().reject(std::move(carried));
+  else writer_.push(std::move(carried));
 }
 
 void Line::send(const PlainOutgoing& item) {
-  if (isEnding()) queue_.reject(item);
-  else enqueue(item);
+  if (isEnding()) queue().reject(item);
+  else writer_.push(item);
 }
 
 void Line::send(const PlainItems& items) {
-  if (!isEnding()) return enqueue(items);
-  for (std::size_t at = 0; at < items.run.size(); ++at) queue_.reject(items[at]);
+  if (!isEnding()) return writer_.push(items);
+  for (std::size_t at = 0; at < items.run.size(); ++at) queue().reject(items[at]);
 }
 
-// Writes after the tasks that are ready now, so that what they send shares the frame.
-template <class... Outgoing>
-void Line::enqueue(Outgoing&&... outgoing) {
-  const bool wasIdle = queue_.isIdle();
-  queue_.push(std::forward<Outgoing>(outgoing)...);
-  if (!wasIdle) return;
-  writes_ =
-      afterReadyTasks(timer_)
-          .then([this] { return writeAll(); })
-          .eagerlyEvaluate([this](kj::Exception&& error) { onWriteFailure(tlsProblem(error)); });
+SendQueue::FrameLimits Line::onFrames() {
+  noteTraffic();
+  return {.items = hasGreeted() ? SIZE_MAX : 1,  // the greeting, alone
+          .bytes = limits_.bufferBytes,
+          .messageBytes = maxMessageBytes()};
 }
 
-kj::Promise<void> Line::writeAll() {
-  if (queue_.isEmpty()) {
-    if (state_ == State::leaving) stream_->shutdownWrite();
-    else if (state_ == State::dropping) finish({farewell_});
-    return kj::READY_NOW;
+// Not for each part of a long frame, because a router that polls for these reads many small ones.
+void Line::noteTraffic() {
+  if (loop_.polling != nullptr) {
+    loop_.polling->noteTraffic();
+    if (direct_) loop_.polling->addLine(*this);
   }
-  const SendQueue::FrameLimits limits{.items = hasGreeted() ? SIZE_MAX : 1,  // the greeting, alone
-                                      .bytes = limits_.bufferBytes,
-                                      .messageBytes = maxMessageBytes()};
   if (events_.onTraffic) events_.onTraffic();
-  queue_.buildFrames(limits, events_.onUnsendable);
-  return writeParts().then([this] {
-    if (resumeReading_ && !queue_.hasMaxAnswers())
-      std::exchange(resumeReading_, nullptr)->fulfill();
-    if (!isEnding()) events_.onRoom();
-    queue_.framesWritten();  // now the queue may be idle, and the next item starts a write
-    return writeAll();
-  });
 }
 
-// Writes the frames in parts, because each part that is written shows that the peer reads: while
-// reading is suspended, it is the only sign of life, and a slow peer may need longer than dead-time
-// for a long frame.
-kj::Promise<void> Line::writeParts() {
-  const auto part = queue_.nextPart();
-  if (part.size() == 0) return kj::READY_NOW;
-  return stream_->write(part).then([this] {
-    if (resumeReading_) keepAlive_.received(Clock::nowNs());
-    return writeParts();
-  });
+// While reading is suspended, it is the only sign of life.
+void Line::onPart() {
+  if (resumeReading_) keepAlive_.received(Clock::nowNs());
+}
+
+void Line::onWritten() {
+  if (resumeReading_ && !queue().hasMaxAnswers()) std::exchange(resumeReading_, nullptr)->fulfill();
+  if (!isEnding()) events_.onRoom();
+}
+
+void Line::onIdle() {
+  if (state_ == State::leaving) stream_->shutdownWrite();
+  else if (state_ == State::dropping) finish({farewell_});
 }
 
 // Keeps reading for a while: the peer may have sent a farewell with the reason.
-void Line::onWriteFailure(const std::string& why) {
+void Line::onWriteFailure(const kj::Exception& error) {
+  const auto why = tlsProblem(error);
   if (isEnding()) return finish({farewell_.empty() ? why : farewell_});
   state_ = State::broken;
   finishLater(why);
@@ -335,9 +371,9 @@ void Line::onWriteFailure(const std::string& why) {
 
 kj::Promise<void> Line::livenessLoop() {
   const auto afterNs = keepAlive_.beginCheck(Clock::nowNs());
-  return timer_.afterDelay(afterNs * kj::NANOSECONDS).then([this]() -> kj::Promise<void> {
+  return loop_.timer.afterDelay(afterNs * kj::NANOSECONDS).then([this]() -> kj::Promise<void> {
     if (const auto why = keepAlive_.check(Clock::nowNs()); !why.empty()) {
-      if (queue_.isIdle()) end(FarewellCode::SILENCE, why);
+      if (!queue().isBeingWritten()) end(FarewellCode::SILENCE, why);
       else finish({why});  // the peer would not read a farewell, either
       return kj::NEVER_DONE;
     }
@@ -357,7 +393,7 @@ void Line::onPing(std::uint64_t stamp) {
   send([stamp](wire::Item::Builder pong) { pong.initPong().setStamp(stamp); });
   const auto nowNs = Clock::nowNs();
   if (keepAlive_.shouldMeasure(nowNs)) ping();
-  if (keepAlive_.tryPostpone(nowNs)) liveness_ = watched(&Line::livenessLoop);
+  if (keepAlive_.tryPostpone(nowNs)) liveness_ = watched([this] { return livenessLoop(); });
 }
 
 }  // namespace mpf::router

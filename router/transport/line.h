@@ -18,6 +18,9 @@
 // When a peer does not read the answers to its items, its items are not read, either. A long frame
 // is handled in turns with the other tasks of the event loop.
 //
+// While the router polls a line of plain TCP, the line is read by poll(), and no task waits for its
+// bytes.
+//
 // Threads  that of the event loop.
 // Crash    the line ends when a peer has crashed, is stopped or unreachable for Limits::deadTime.
 // Trust    a protocol error ends the line with a farewell that names it.
@@ -25,14 +28,18 @@
 
 #include <functional>
 #include <kj/async-io.h>
+#include <kj/function.h>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "router/config/router_config.h"
+#include "router/polling.h"
 #include "router/protocol_error.h"
 #include "router/statistics.h"
+#include "router/transport/direct_io.h"
 #include "router/transport/frame_reader.h"
+#include "router/transport/frame_writer.h"
 #include "router/transport/keep_alive.h"
 #include "router/transport/peer_greeting.h"
 #include "router/transport/plain_item.h"
@@ -46,7 +53,7 @@ struct LineEnd {
   std::string text;
 };
 
-class Line {
+class Line final : public Polled, private FrameWriter::Owner {
  public:
   using FillItem = SendQueue::FillItem;
 
@@ -64,8 +71,7 @@ class Line {
     std::function<void(const PlainItems& items)> onPlainItems{};
     // hasRoom() may have become true.
     std::function<void()> onRoom;
-    // A frame has arrived, or frames are sent; not for each part of a long frame, because a router
-    // that polls for these reads many small ones. May be empty.
+    // A frame has arrived, or frames are sent; Polling knows it already. May be empty.
     std::function<void()> onTraffic{};
     // Items were handled: all that have arrived, or those of one turn. May be empty.
     std::function<void()> onHandled{};
@@ -73,8 +79,17 @@ class Line {
     SendQueue::OnUnsendable onUnsendable;
   };
 
-  Line(kj::Own<kj::AsyncIoStream> stream, kj::Timer& timer, const Limits& limits,
+  // The event loop, for lines.
+  struct Loop {
+    kj::Timer& timer;
+    DueWrites& writes;
+    Polling* polling = nullptr;  // nullptr: the router sleeps at once
+  };
+
+  // What `loop` refers to, and `record`, outlive this object.
+  Line(kj::Own<kj::AsyncIoStream> stream, Security security, const Loop& loop, const Limits& limits,
        PeerRecord& record, Events events);
+  ~Line();
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
@@ -94,7 +109,7 @@ class Line {
   [[nodiscard]] bool hasRoom() const noexcept { return room() != 0; }
   // For how many messages there is room.
   [[nodiscard]] std::size_t room() const noexcept {
-    return state_ == State::open ? queue_.room() : 0;
+    return state_ == State::open ? queue().room() : 0;
   }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
   [[nodiscard]] bool hasGreeted() const noexcept { return peer_.hasArrived(); }
@@ -106,11 +121,17 @@ class Line {
     return peer_.maxMessageBytesWith(limits_);
   }
 
+  // For Polling.
+  void poll() override;
+  void setPolled(bool isPolled) override;
+
   // After the end of the line: returns the requests that were never written to the stream.
-  [[nodiscard]] std::vector<Carried> takeUnsentRequests() { return queue_.takeUnsentRequests(); }
+  [[nodiscard]] std::vector<Carried> takeUnsentRequests() { return queue().takeUnsentRequests(); }
 
  private:
   enum class State { greeting, open, leaving, dropping, broken, finished };
+  // What follows a read.
+  enum class Next { read, handle, discard, nothing };
 
   [[nodiscard]] bool isEnding() const noexcept {
     return state_ != State::greeting && state_ != State::open;
@@ -119,13 +140,16 @@ class Line {
   [[nodiscard]] bool discardsInput() const noexcept {
     return isEnding() && state_ != State::broken;
   }
-  kj::Promise<void> watched(kj::Promise<void> (Line::*loop)());
+  kj::Promise<void> watched(kj::Function<kj::Promise<void>()> loop);
   void finish(LineEnd end);
   void finishLater(const std::string& why);
 
   kj::Promise<void> readLoop();
   kj::Promise<void> readAndDiscard();
-  kj::Promise<void> handleReceived();
+  void readDirectly();
+  Next received(std::size_t bytes);
+  Next handleReceived();
+  kj::Promise<void> proceed(Next next);
   kj::Promise<void> whenAnswersAreSent();
   bool handleSome();
   bool tryNextFrame();
@@ -134,22 +158,29 @@ class Line {
   void takeGreeting(wire::Greeting::Reader greeting);
   [[nodiscard]] std::string closedReason() const;
 
-  template <class... Outgoing>
-  void enqueue(Outgoing&&... outgoing);
-  kj::Promise<void> writeAll();
-  kj::Promise<void> writeParts();
-  void onWriteFailure(const std::string& why);
+  [[nodiscard]] SendQueue& queue() noexcept { return writer_.queue(); }
+  [[nodiscard]] const SendQueue& queue() const noexcept { return writer_.queue(); }
+  SendQueue::FrameLimits onFrames() override;
+  void onPart() override;
+  void onWritten() override;
+  void onIdle() override;
+  void noteTraffic();
+  void onReadFailure(const kj::Exception& error);
+  void onWriteFailure(const kj::Exception& error) override;
 
   kj::Promise<void> livenessLoop();
   void ping();
   void onPing(std::uint64_t stamp);
 
   kj::Own<kj::AsyncIoStream> stream_;
-  kj::Timer& timer_;
+  DirectIo direct_;
+  Loop loop_;
   Limits limits_;
   PeerRecord& record_;
   Events events_;
   State state_ = State::greeting;
+  bool isPolled_ = false;
+  bool pollReads_ = false;  // poll() reads the next bytes, and no task
   PeerGreeting peer_;
   FrameReader reader_;
   std::optional<capnp::List<wire::Item>::Reader> items_;  // of the frame that is being handled
@@ -159,14 +190,13 @@ class Line {
   MessageRun plainMessages_;
   std::uint32_t plainClient_ = 0;  // of the last plain item
   bool hasHandled_ = false;  // an item, since the last onHandled()
-  SendQueue queue_;
+  FrameWriter writer_;
   // Notes that are sent while items of the peer are handled are answers.
   SendQueue::Origin origin_ = SendQueue::Origin::own;
   KeepAlive keepAlive_;
   std::string farewell_;  // the text of our farewell
   kj::Own<kj::PromiseFulfiller<LineEnd>> ended_;
   kj::Own<kj::PromiseFulfiller<void>> resumeReading_;  // nullptr: reading is not suspended
-  kj::Promise<void> writes_ = nullptr;
   kj::Promise<void> reads_ = nullptr;
   kj::Promise<void> liveness_ = nullptr;
   kj::Promise<void> farewellTimer_ = nullptr;

@@ -151,18 +151,27 @@ void SendQueue::buildFrames(const FrameLimits& limits, const OnUnsendable& onUns
   count(record_->bytesSent, bytes);
 }
 
-// Shortens the pieces from the front.
-SendQueue::Pieces SendQueue::nextPart() {
+SendQueue::Pieces SendQueue::part() {
   part_.clear();
-  for (auto room = kPartBytes; room != 0 && nextPiece_ != pieces_.size();) {
-    auto& piece = pieces_[nextPiece_];
+  auto room = kPartBytes;
+  for (auto at = nextPiece_; room != 0 && at != pieces_.size(); ++at) {
+    const auto& piece = pieces_[at];
     const auto bytes = std::min(room, piece.size());
     if (bytes != 0) part_.push_back(piece.slice(0, bytes));
-    piece = piece.slice(bytes, piece.size());
     room -= bytes;
-    if (piece.size() == 0) ++nextPiece_;
   }
   return {part_.data(), part_.size()};
+}
+
+// Shortens the pieces from the front.
+void SendQueue::partWritten(std::size_t bytes) noexcept {
+  while (bytes != 0) {
+    auto& piece = pieces_[nextPiece_];
+    const auto written = std::min(bytes, piece.size());
+    piece = piece.slice(written, piece.size());
+    bytes -= written;
+    if (piece.size() == 0) ++nextPiece_;
+  }
 }
 
 std::size_t SendQueue::buildPlainFrame() {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // SendQueue: the items that wait to be sent over one connection, and the frames built from them.
 //
-//   push() ─► queue ─► buildFrames(): as many items as fit ─► nextPart() ─► framesWritten()
+//   push() ─► queue ─► buildFrames(): as many items as fit ─► part(), partWritten() ─► framesWritten()
 //                                                             ▲      │
 //                                                             └──────┘ the caller writes the part
 //
@@ -70,16 +70,18 @@ class SendQueue {
   // Whether so many answers wait that no more items of the peer should be handled.
   [[nodiscard]] bool hasMaxAnswers() const noexcept { return answers_ >= kMaxControlItems; }
   [[nodiscard]] bool isEmpty() const noexcept { return queue_.empty(); }
-  // Whether no item waits and no frame is being written.
-  [[nodiscard]] bool isIdle() const noexcept { return isEmpty() && pieces_.empty(); }
+  // Whether frames were built that framesWritten() has not ended.
+  [[nodiscard]] bool isBeingWritten() const noexcept { return !pieces_.empty(); }
 
   // Moves at least one item, and as many as the limits allow, into frames. The queue must not be
   // empty.
   void buildFrames(const FrameLimits& limits, const OnUnsendable& onUnsendable);
   // Returns the next kPartBytes of the frames, or what is left, in pieces that are valid until the
-  // next call; nothing when all bytes have been returned.
+  // next call; nothing when all bytes have been written.
   using Pieces = kj::ArrayPtr<const kj::ArrayPtr<const kj::byte>>;
-  [[nodiscard]] Pieces nextPart();
+  [[nodiscard]] Pieces part();
+  // The first `bytes` of part() have been written.
+  void partWritten(std::size_t bytes) noexcept;
   void framesWritten();
 
   // Empties the queue, and returns its requests and those that were rejected. Those that were plain
@@ -119,7 +121,7 @@ class SendQueue {
   std::vector<std::uint32_t> table_;  // its segment table
   std::vector<Run> runs_;
   std::vector<kj::ArrayPtr<const kj::byte>> pieces_;
-  std::size_t nextPiece_ = 0;  // the first one that nextPart() has not returned completely
+  std::size_t nextPiece_ = 0;  // the first one that is not written completely
   std::vector<kj::ArrayPtr<const kj::byte>> part_;
   std::vector<Run> spareRuns_;
 };

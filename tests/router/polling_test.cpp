@@ -40,11 +40,16 @@ class PollingTest : public testing::Test {
   ~PollingTest() noexcept override = default;
 
  protected:
+  void add(router::Polled& window) {
+    polling_.noteTraffic();
+    polling_.addWindow(window);
+  }
   void wait() { io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope); }
 
   const Watchdog watchdog_{"polling"};
   kj::AsyncIoContext io_ = kj::setupAsyncIo();
-  Polling polling_{io_.unixEventPort};
+  router::DueWrites writes_{io_.provider->getTimer()};
+  Polling polling_{io_.unixEventPort, writes_};
 };
 
 TEST_F(PollingTest, EndsAWhileAfterTheLastTraffic) {
@@ -67,15 +72,19 @@ TEST_F(PollingTest, SleepsForSomeTrafficWhenOthersUseTheProcessor) {
   const ReplacedYield replaced(yield);
   std::optional<Polling> polling;
   while (!yielded) {  // on a busy host, the time for polling may pass before
-    polling.emplace(io_.unixEventPort).noteTraffic();
+    polling.emplace(io_.unixEventPort, writes_).noteTraffic();
     while (polling->isPolling()) wait();
   }
 
-  polling->add(window);
+  polling->noteTraffic();
+  polling->addWindow(window);
 
   EXPECT_FALSE(polling->isPolling());
   EXPECT_FALSE(window.isPolled);
-  while (!window.isPolled) polling->add(window);
+  while (!window.isPolled) {
+    polling->noteTraffic();
+    polling->addWindow(window);
+  }
   while (polling->isPolling()) wait();
 }
 
@@ -98,7 +107,7 @@ TEST_F(PollingTest, HandlesEventsOfDescriptors) {
 // As while many peers send all the time.
 TEST_F(PollingTest, PollsThoughOtherTasksAreAlwaysReady) {
   Window window;
-  while (!window.isPolled) polling_.add(window);
+  while (!window.isPolled) add(window);
   const BusyTasks busy(io_);
 
   while (window.polls == 0) wait();
@@ -121,7 +130,7 @@ TEST_F(PollingTest, RunsTheTasksThatWaitedWhenItBegan) {
   int pollsBefore = -1;
   auto write = kj::evalLast([&] { pollsBefore = busy.polls; }).eagerlyEvaluate(nullptr);
 
-  polling_.add(busy);
+  add(busy);
   while (polling_.isPolling()) wait();
 
   EXPECT_EQ(pollsBefore, 0);
@@ -130,7 +139,7 @@ TEST_F(PollingTest, RunsTheTasksThatWaitedWhenItBegan) {
 TEST_F(PollingTest, PollsAWindowUntilItSleepsAndOnceMore) {
   Window window;
 
-  polling_.add(window);
+  add(window);
 
   EXPECT_TRUE(window.isPolled);
   while (polling_.isPolling()) wait();
@@ -143,7 +152,7 @@ TEST_F(PollingTest, LooksForAnswersAfterTheirSendersHaveRun) {
   int pollsAtYield = -1;
   polling_.lookForAnswers();
   EXPECT_EQ(window.polls, 0) << "it does not poll";
-  while (!window.isPolled) polling_.add(window);
+  while (!window.isPolled) add(window);
   const auto before = window.polls;
 
   {
@@ -159,7 +168,7 @@ TEST_F(PollingTest, LooksForAnswersAfterTheirSendersHaveRun) {
 
 TEST_F(PollingTest, EndsWhenOthersUseTheProcessorWhileItLooksForAnswers) {
   Window window;
-  while (!window.isPolled) polling_.add(window);
+  while (!window.isPolled) add(window);
 
   {
     const std::function<void()> yield = [] { othersRun(std::chrono::milliseconds(2)); };
@@ -171,9 +180,9 @@ TEST_F(PollingTest, EndsWhenOthersUseTheProcessorWhileItLooksForAnswers) {
   EXPECT_EQ(window.polls, polls) << "it gives the processor up once";
   while (polling_.isPolling()) wait();
 
-  polling_.add(window);
+  add(window);
   EXPECT_FALSE(polling_.isPolling()) << "nor does it poll for the next traffic";
-  while (!polling_.isPolling()) polling_.add(window);
+  while (!polling_.isPolling()) add(window);
   while (polling_.isPolling()) wait();
 }
 
@@ -187,7 +196,7 @@ TEST_F(PollingTest, AnErrorOfAWindowEndsTheRouterNotTheLineThatLooksForAnswers) 
     bool isPolled = false;
   };
   Faulty window;
-  while (!window.isPolled) polling_.add(window);
+  while (!window.isPolled) add(window);
   window.isFaulty = true;
 
   EXPECT_NO_THROW(polling_.lookForAnswers());
@@ -205,7 +214,7 @@ TEST_F(PollingTest, HandlesWhatTheDescriptorsBroughtBeforeItPolls) {
   char byte = 0;
   auto read = pipe.ends[1]->read(&byte, 1).then([&] { pollsBefore = window.polls; });
   auto handled = read.eagerlyEvaluate(nullptr);
-  while (!window.isPolled) polling_.add(window);
+  while (!window.isPolled) add(window);
 
   pipe.ends[0]->write("x", 1).wait(io_.waitScope);
   while (polling_.isPolling()) wait();
@@ -214,10 +223,10 @@ TEST_F(PollingTest, HandlesWhatTheDescriptorsBroughtBeforeItPolls) {
 }
 
 TEST_F(PollingTest, PollsTheWindowsThatWereBusyLast) {
-  std::array<Window, Polling::kMaxWindows + 1> windows;
+  std::array<Window, router::PolledSet::kMax + 1> windows;
   for (auto& window : windows) {
-    polling_.add(windows.front());
-    polling_.add(window);
+    add(windows.front());
+    add(window);
   }
 
   EXPECT_TRUE(windows.front().isPolled) << "it was busy all the time";
@@ -231,19 +240,19 @@ TEST_F(PollingTest, PollsTheWindowsThatWereBusyLast) {
 TEST_F(PollingTest, PollsNoMoreThanItsMaximum) {
   struct Busy final : router::Polled {
     explicit Busy(Polling& of) : polling(of) {}
-    void poll() override { polling.add(*this); }
+    void poll() override { polling.addWindow(*this); }
     void setPolled(bool polled) override { isPolled = polled; }
     Polling& polling;
     bool isPolled = false;
   };
   std::vector<std::unique_ptr<Busy>> windows;
-  for (std::size_t i = 0; i < 2 * Polling::kMaxWindows; ++i) {
+  for (std::size_t i = 0; i < 2 * router::PolledSet::kMax; ++i) {
     windows.push_back(std::make_unique<Busy>(polling_));
-    polling_.add(*windows.back());
+    add(*windows.back());
   }
 
   EXPECT_EQ(std::ranges::count_if(windows, [](const auto& each) { return each->isPolled; }),
-            static_cast<std::ptrdiff_t>(Polling::kMaxWindows));
+            static_cast<std::ptrdiff_t>(router::PolledSet::kMax));
   EXPECT_TRUE(windows.back()->isPolled);
   for (const auto& window : windows) polling_.remove(*window);
 }
@@ -262,8 +271,8 @@ TEST_F(PollingTest, ForgetsAWindowThatIsDestroyedWhilePollingEnds) {
   };
   Window window;
   Killer killer(polling_, window);
-  polling_.add(killer);
-  polling_.add(window);
+  add(killer);
+  add(window);
 
   while (polling_.isPolling()) wait();
 
@@ -272,7 +281,7 @@ TEST_F(PollingTest, ForgetsAWindowThatIsDestroyedWhilePollingEnds) {
 
 TEST_F(PollingTest, ForgetsAWindowThatIsDestroyed) {
   Window window;
-  polling_.add(window);
+  add(window);
 
   polling_.remove(window);
 

@@ -49,7 +49,8 @@ class LineTest : public testing::Test {
   }
 
   void start() {
-    line_ = std::make_unique<Line>(kj::mv(pipe_.ends[0]), io_.provider->getTimer(), limits_,
+    line_ = std::make_unique<Line>(kj::mv(pipe_.ends[0]), router::Security::plain,
+                                   Line::Loop{io_.provider->getTimer(), writes_, polling_}, limits_,
                                    record_, events());
     running_ = line_
                    ->run([this](wire::Item::Builder item) {
@@ -158,6 +159,8 @@ class LineTest : public testing::Test {
   kj::Own<kj::AsyncIoStream> peer_ = kj::mv(pipe_.ends[1]);
   layout::RouterLine row_{};
   router::PeerRecord record_{row_};
+  router::DueWrites writes_{io_.provider->getTimer()};
+  router::Polling* polling_ = nullptr;  // set it before start()
   std::unique_ptr<Line> line_;
   std::vector<std::string> said_;  // what the line has reported
   std::string end_;                // why the line ended; empty: it has not

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// DueWrites: the objects that have something to write to their connections. They write after the
+// tasks that are ready now, so that what these send shares a frame, and without a task for each:
+// while a router polls, it calls run() in each turn and after it has looked for answers; otherwise
+// one task writes for all.
+//
+// Threads  that of the event loop.
+#pragma once
+
+#include <kj/timer.h>
+#include <vector>
+
+#include "router/fatal_tasks.h"
+
+namespace mpf::router {
+
+class Writer {
+ public:
+  // Writes what is there. Throws nothing.
+  virtual void writeDue() = 0;
+
+ protected:
+  ~Writer() = default;
+};
+
+class DueWrites {
+ public:
+  explicit DueWrites(kj::Timer& timer) noexcept : timer_(timer) {}
+  ~DueWrites() noexcept = default;
+
+  // `writer` writes soon. Do not add it again before its writeDue() was called.
+  void add(Writer& writer);
+  // `writer` is destroyed.
+  void remove(Writer& writer) noexcept;
+  // Writes now. What is added meanwhile waits for the next call.
+  void run();
+  // While `isDriven` is true, the caller of this function calls run() often.
+  void setDriven(bool isDriven);
+
+ private:
+  void runSoon();
+
+  kj::Timer& timer_;
+  std::vector<Writer*> due_;
+  std::vector<Writer*> running_;  // those of this run(); nullptr: removed
+  bool isDriven_ = false;
+  bool hasTask_ = false;
+  FatalTasks tasks_;
+};
+
+}  // namespace mpf::router
