@@ -131,7 +131,8 @@ bool Router::tryMakeRoom() {
 }
 
 void Router::lookAtServers() {
-  for (const auto& session : sessions_) session.router->lookAtServers();
+  monitors_.lookAtAll();
+  for (const auto& session : sessions_) session.router->onServers();
 }
 
 void Router::readPendingBindsSoon() { pendingBindsDue_.setAt(Deadline::after(kPendingBindsDelay)); }

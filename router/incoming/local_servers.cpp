@@ -147,13 +147,20 @@ void LocalServers::onConfig() {
 
 // ---- the servers of the bindings
 
-void LocalServers::lookAtAll() {
-  for (auto& [number, binding] : bindings_) look(binding);
+void LocalServers::onServers() {
+  if (!bindings_.empty()) lookSoon();
+  for (auto& [number, binding] : bindings_) update(binding);
 }
 
 void LocalServers::look(Binding& binding) {
   lookSoon();
-  const bool isThere = binding.monitor->look();
+  binding.monitor->look();
+  update(binding);
+}
+
+// After a look().
+void LocalServers::update(Binding& binding) {
+  const bool isThere = binding.monitor->isThere();
   logFailure(binding, !isThere && binding.monitor->isDoubtful());
   if (isThere && binding.announced == binding.monitor->incarnation()) return;
   if (binding.state == Binding::State::there) beginEnd(binding);

@@ -48,8 +48,8 @@ class LocalServers {
   // is sent instead.
   void loseReply(const Carried& reply, const std::string& why, wire::Item::Builder instead);
 
-  // Servers may have started or ended.
-  void lookAtAll();
+  // Servers may have started or ended: ServerMonitors has looked at all.
+  void onServers();
   // The served locations or the rules in [[allow]] have changed.
   void onConfig();
 
@@ -76,6 +76,7 @@ class LocalServers {
   void refuseBind(std::uint32_t number, const std::string& why);
   void refuseClient(std::uint32_t number, const std::string& why);
   void look(Binding& binding);
+  void update(Binding& binding);
   void lookAtDoubtful();
   void lookSoon();
   void logFailure(Binding& binding, bool hasFailed);

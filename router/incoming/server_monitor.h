@@ -32,6 +32,8 @@ class ServerMonitor {
 
   // Asks the kernel whether the server is running. If true, the accessors below describe it.
   bool look();
+  // What the last look() has returned.
+  [[nodiscard]] bool isThere() const noexcept { return window_ != nullptr; }
 
   // Whether the next look() may have another result although `onChange` was not called.
   [[nodiscard]] bool isDoubtful() const noexcept { return window_ ? window_->isClosed() : failed_; }

@@ -20,4 +20,8 @@ std::shared_ptr<ServerMonitor> ServerMonitors::of(const ServerName& name) {
   return first;
 }
 
+void ServerMonitors::lookAtAll() {
+  for (auto& [name, each] : all_) each.monitor.look();
+}
+
 }  // namespace mpf::router

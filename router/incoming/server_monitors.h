@@ -18,8 +18,8 @@ namespace mpf::router {
 
 class ServerMonitors {
  public:
-  // Calls `onChange` when a server may have started or ended. All bindings must then call look()
-  // again, because the look() of one binding consumes the change for all.
+  // Calls `onChange` when a server may have started or ended. Then call lookAtAll(), and tell all
+  // bindings: the look() of one of them has consumed the change for the others.
   ServerMonitors(const Backplane& backplane, kj::UnixEventPort& port,
                  std::function<void()> onChange);
   ~ServerMonitors() noexcept;
@@ -28,6 +28,8 @@ class ServerMonitors {
 
   // The ServerMonitor is destroyed with its last reference, which must not outlive this object.
   [[nodiscard]] std::shared_ptr<ServerMonitor> of(const ServerName& name);
+  // Calls look() of each, once for all of its users, because it asks the kernel.
+  void lookAtAll();
 
  private:
   struct Shared {

@@ -35,8 +35,8 @@ class ServerRouter {
   [[nodiscard]] bool hasGreeted() const noexcept { return line_.hasGreeted(); }
   // The served locations or the rules in [[allow]] have changed.
   void onConfig();
-  // Servers may have started or ended.
-  void lookAtServers() { servers_.lookAtAll(); }
+  // Servers may have started or ended: ServerMonitors has looked at all.
+  void onServers() { servers_.onServers(); }
 
  private:
   [[nodiscard]] Line::Events lineEvents();

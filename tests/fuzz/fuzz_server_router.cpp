@@ -22,7 +22,10 @@ class ServerRouterPlay {
                                                        "", "fuzz", false)),
         run_(router_->run().then([this] { over_ = true; }).eagerlyEvaluate(nullptr)) {
     openServer();
-    scene_.onServers = [this] { router_->lookAtServers(); };
+    scene_.onServers = [this] {
+      scene_.monitors.lookAtAll();
+      router_->onServers();
+    };
   }
   ~ServerRouterPlay() {
     scene_.onServers = [] {};

@@ -40,6 +40,10 @@ class LocalServersTest : public RouterPartsTest {
     sendItems({bind(1)});
     EXPECT_THAT(nextItem(), HasSubstr("state = there"));
   }
+  void lookAtAll() {
+    monitors_.lookAtAll();
+    servers_->onServers();
+  }
   // Opens a client of binding 1.
   void openClient(std::uint32_t number = 1) {
     sendItems({open(number, 1, monitors_.of({0, "echo"})->incarnation())});
@@ -61,11 +65,11 @@ TEST_F(LocalServersTest, TellWhenAServerStartsAndEnds) {
   EXPECT_THAT(nextItem(), AllOf(StartsWith("(server = (binding = 1, "), HasSubstr("absent")));
 
   server_.emplace(backplane_, "echo", ServerOptions{.queueSize = 7});
-  servers_->lookAtAll();
+  lookAtAll();
   EXPECT_THAT(nextItem(), AllOf(HasSubstr("state = there"), HasSubstr("queueSize = 7")));
 
   server_.reset();
-  servers_->lookAtAll();
+  lookAtAll();
   EXPECT_THAT(nextItem(), AllOf(HasSubstr("binding = 1"), HasSubstr("absent")));
 }
 
@@ -128,7 +132,7 @@ TEST_F(LocalServersTest, EndTheRequestsOfAServerBeforeItIsAbsent) {
   sendItems({test::request(1, 6)});
 
   server_.reset();
-  servers_->lookAtAll();
+  lookAtAll();
 
   EXPECT_THAT(nextItem(),
               AllOf(StartsWith("(fate = (client = 1, requestId = 5"), HasSubstr("outcomeUnknown")));
@@ -146,7 +150,7 @@ TEST_F(LocalServersTest, EndTheRequestsThatWaitForTheServerToAcceptTheirClient) 
   sendItems({test::request(1, 5)});
 
   server_.reset();
-  servers_->lookAtAll();
+  lookAtAll();
 
   EXPECT_THAT(nextItem(),
               AllOf(StartsWith("(fate = (client = 1, requestId = 5"), HasSubstr("neverTaken")));

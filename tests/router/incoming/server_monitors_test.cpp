@@ -33,6 +33,23 @@ TEST(ServerMonitors, HaveOneMonitorForEachServer) {
   EXPECT_TRUE(gone.expired());
 }
 
+TEST(ServerMonitors, LookForAllUsersAtOnce) {
+  const mpf::test::TestBackplane servers;
+  auto io = kj::setupAsyncIo();
+  ServerMonitors monitors(servers, io.unixEventPort, [] {});
+  const auto echo = monitors.of({0, "echo"});
+  const auto dac = monitors.of({0, "dac"});
+  std::optional<MessageServer> server(std::in_place, servers, "echo", ServerOptions{});
+
+  monitors.lookAtAll();
+  EXPECT_TRUE(echo->isThere());
+  EXPECT_FALSE(dac->isThere());
+
+  server.reset();
+  monitors.lookAtAll();
+  EXPECT_FALSE(echo->isThere());
+}
+
 // A look() that finds a change notifies the users that did not call it.
 TEST(ServerMonitors, NotifyAllUsersOfAChange) {
   const mpf::test::Watchdog watchdog("monitors");
