@@ -201,6 +201,24 @@ async def test_values_are_observed(dac: Dac) -> None:
     assert found == [0.0, 1.0, 2.0]
 
 
+async def test_an_error_of_a_callback_is_logged(
+    dac: Dac, caplog: pytest.LogCaptureFixture
+) -> None:
+    signal = await connected(voltage(subscribe=mpf.OutOfBand()))
+    found: asyncio.Queue[float] = asyncio.Queue()
+
+    def show(reading: dict[str, Any]) -> None:
+        found.put_nowait(reading["value"])
+        raise ValueError("broken display")
+
+    backend = signal._connector.backend
+    backend.set_callback(show)
+    assert [await found.get() for _ in range(3)] == [0.0, 1.0, 2.0]
+    backend.set_callback(None)
+    assert "broken display" in caplog.text
+    caplog.clear()  # the records refer to the client
+
+
 async def test_values_without_a_subscription_are_read_again(dac: Dac) -> None:
     signal = await connected(voltage(poll=0.001))
     async for value in observe_value(signal):

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import math
 import time
 from collections.abc import AsyncGenerator, Iterable
@@ -58,6 +59,8 @@ __all__ = [
     "mpf_signal_w",
     "mpf_triggerable_command",
 ]
+
+_log = logging.getLogger("mpf")
 
 _STALE = -1  # the alarm severity of a value that may have changed since
 
@@ -151,8 +154,12 @@ class MpfSignalBackend(SignalBackend[SignalDatatypeT]):
             self._task = asyncio.get_running_loop().create_task(self._watch(callback))
 
     async def _watch(self, callback: Callback[Reading[SignalDatatypeT]]) -> None:
+        """Logs what the callback raises, because nobody awaits this task, and continues."""
         async for reading in self._readings():
-            callback(reading)
+            try:
+                callback(reading)
+            except Exception:
+                _log.exception("%s: the callback for readings failed", self.source("", True))
 
     async def _readings(self) -> AsyncGenerator[Reading[SignalDatatypeT], None]:
         while True:

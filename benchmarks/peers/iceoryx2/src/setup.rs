@@ -6,6 +6,7 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::*;
 use std::error::Error;
+use std::time::Duration;
 
 pub type Failure = Box<dyn Error>;
 pub type IpcNode = Node<ipc::Service>;
@@ -82,12 +83,16 @@ impl Bells {
         }
     }
 
+    /// Waits for 100 ms at most, because iceoryx2 0.10.0 can lose a notification (Waiter and
+    /// Handle::notify in event/common.rs of iceoryx2-cal): after a listener has emptied the buffer
+    /// of a notifier that is between its write and its state NOTIFIED, the listener sleeps, and
+    /// later notifications write nothing.
     #[inline(always)]
     pub fn wait(&self) {
         match &self.rings {
             None => core::hint::spin_loop(),
             Some((_, listener)) => {
-                listener.blocking_wait(|_| {}).expect("blocking_wait");
+                listener.timed_wait(|_| {}, Duration::from_millis(100)).expect("timed_wait");
             }
         }
     }
