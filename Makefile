@@ -75,12 +75,14 @@ bench-peers: release ## build iceoryx2 and Aeron for `make bench` (after scripts
 	@cmake --preset release --log-level=NOTICE
 	cmake --build --preset release --parallel $(JOBS) --target mpf-bench
 
-# Also writes the table to build/release/bench/.
+# Also writes the table to build/release/bench/, and the results as JSON (not of Python), for
+# scripts/speed-tables.
 bench: release $(if $(filter-out local,$(BENCH)),,bench-peers)
 bench: ## measure this host (BENCH=local, remote, hardware, epics or python)
 	@mkdir -p build/release/bench
 	PYTHONPATH=build/release/python:build/python-packages PATH="build/release/bin:$$PATH" \
-		bash -o pipefail -c 'mpf bench $(or $(BENCH),local) | \
+		bash -o pipefail -c 'mpf bench $(or $(BENCH),local) \
+		$(if $(filter python,$(BENCH)),,--json build/release/bench/$(or $(BENCH),local).json) | \
 		tee build/release/bench/$(or $(BENCH),local).txt'
 
 # FILES: a folder with startup files; IP: the folder of the databases that they name ipApp/Db/...
