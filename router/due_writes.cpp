@@ -8,7 +8,7 @@
 
 namespace mpf::router {
 
-void DueWrites::add(Writer& writer) {
+void DueWrites::add(DueWriter& writer) {
   due_.push_back(&writer);
   if (!isDriven_) runSoon();
 }
@@ -21,13 +21,13 @@ void DueWrites::runSoon() {
   }));
 }
 
-void DueWrites::remove(Writer& writer) noexcept {
+void DueWrites::remove(DueWriter& writer) noexcept {
   std::erase(due_, &writer);
   std::ranges::replace(running_, &writer, nullptr);
 }
 
 void DueWrites::run() {
-  if (!running_.empty()) return;  // a writer calls
+  if (!running_.empty()) return;  // called by a writeDue()
   running_.swap(due_);
   for (auto& writer : running_)
     if (writer != nullptr) writer->writeDue();

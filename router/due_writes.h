@@ -14,35 +14,36 @@
 
 namespace mpf::router {
 
-class Writer {
+class DueWriter {
  public:
-  // Writes what is there. Throws nothing.
-  virtual void writeDue() = 0;
+  // Writes what is there.
+  virtual void writeDue() noexcept = 0;
 
  protected:
-  ~Writer() = default;
+  ~DueWriter() = default;
 };
 
 class DueWrites {
  public:
+  // `timer` outlives this object.
   explicit DueWrites(kj::Timer& timer) noexcept : timer_(timer) {}
   ~DueWrites() noexcept = default;
 
   // `writer` writes soon. Do not add it again before its writeDue() was called.
-  void add(Writer& writer);
-  // `writer` is destroyed.
-  void remove(Writer& writer) noexcept;
+  void add(DueWriter& writer);
+  // Call it before the writer is destroyed, whether it was added or not.
+  void remove(DueWriter& writer) noexcept;
   // Writes now. What is added meanwhile waits for the next call.
   void run();
-  // While `isDriven` is true, the caller of this function calls run() often.
+  // True: the caller calls run() in each turn. False: a task writes, also what is due already.
   void setDriven(bool isDriven);
 
  private:
   void runSoon();
 
   kj::Timer& timer_;
-  std::vector<Writer*> due_;
-  std::vector<Writer*> running_;  // those of this run(); nullptr: removed
+  std::vector<DueWriter*> due_;
+  std::vector<DueWriter*> running_;  // those of this run(); nullptr: removed
   bool isDriven_ = false;
   bool hasTask_ = false;
   FatalTasks tasks_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Polled: what a router that is awake looks into, instead of waiting for a notification: a window
-// with links, or a connection. PolledSet: those that were busy lately.
+// Polled: a window with links, or a connection, into which a router that polls looks itself.
+// PolledSet: those that were busy lately.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -14,7 +14,7 @@ class Polled {
  public:
   // Handles what is there.
   virtual void poll() = 0;
-  // While `isPolled` is true, poll() is called all the time, and the event loop need not be woken.
+  // While `isPolled` is true, poll() is called in each turn, and the event loop need not be woken.
   // After a change to false, one more poll() follows.
   virtual void setPolled(bool isPolled) = 0;
 
@@ -26,10 +26,10 @@ class PolledSet {
  public:
   static constexpr std::size_t kMax = 8;  // at a time
 
-  // `polled` was busy: it replaces the one that was added first, if there are too many. Does
-  // nothing during the last poll() of one that is replaced.
+  // If there are kMax, `polled` replaces the one whose last add() is the oldest. Does nothing
+  // during the last poll() of one that is replaced.
   void add(Polled& polled);
-  // `polled` is destroyed.
+  // Call it before the object is destroyed, whether it was added or not.
   void remove(Polled& polled) noexcept;
   // Polls each once. A poll() may add others, which are not polled yet, or remove some.
   void poll();

@@ -12,7 +12,7 @@
 namespace mpf::router {
 namespace {
 
-// The writes that follow a read belong to the same burst: there was no wait between them.
+// After fewer idle turns, traffic belongs to the same burst, for example the write after a read.
 constexpr std::uint32_t kTurnsOfWait = 2;
 
 }  // namespace
@@ -33,10 +33,9 @@ void Polling::remove(Polled& polled) noexcept {
   windows_.remove(polled);
 }
 
-// afterDelay(0): the event loop first runs all tasks that are ready and looks at its descriptors.
-// afterReadyTasks(): the turn runs after the handlers of what the descriptors have brought. Of the
-// calls of afterReadyTasks() the newest one resolves first: writes that were due when the polling
-// began run before the first turn.
+// afterDelay(0): the event loop first runs all tasks that are ready, among them the writes that
+// were due when the polling began, and looks at its descriptors. afterReadyTasks(): the turn runs
+// after the handlers of what the descriptors have brought.
 kj::Promise<void> Polling::nextTurn() {
   auto& timer = port_.getTimer();
   return timer.afterDelay(0 * kj::NANOSECONDS)
@@ -62,7 +61,7 @@ kj::Promise<void> Polling::loop() {
 void Polling::lookForAnswers() {
   if (!isPolling_ || std::exchange(hasLooked_, true)) return;
   isCrowded_ = !tryYield(Clock::nowNs());
-  // An error of a window does not concern the line that calls.
+  // evalNow: an exception ends the router (FatalTasks), not the line that calls.
   tasks_.add(kj::evalNow([this]() -> kj::Promise<void> {
     windows_.poll();
     writes_.run();
@@ -83,7 +82,7 @@ void Polling::end() {
   hasLooked_ = isCrowded_ = false;
   lines_.clear();
   windows_.clear();
-  // The last look into a window may have begun to poll again.
+  // The last poll() of a window may have called noteTraffic().
   writes_.setDriven(isPolling_);
 }
 

@@ -6,10 +6,10 @@
 //
 // While it polls, it looks at the descriptors of the event loop, into the connections that were
 // busy lately, and into the rings of the windows that were: their clients and servers need no
-// system call to hand a message over. It gives up the processor in each turn and after each frame:
-// clients and servers on the same processor run first. If others then use it for long, the router
-// sleeps, and does not poll after the next bursts of traffic (SharedProcessor). What is due is
-// written at the end of a turn, and when it has looked for answers (DueWrites).
+// system call to hand a message over. It yields the processor once in each turn, and at most once
+// more in lookForAnswers(): clients and servers on this processor run first. After a long yield the
+// router sleeps, and does not poll after the next bursts of traffic (SharedProcessor). What is due
+// is written at the beginning and the end of each turn, and in lookForAnswers() (DueWrites).
 //
 // Threads  that of the event loop.
 #pragma once
@@ -32,8 +32,9 @@ class Polling {
 
   // Messages have arrived or were sent.
   void noteTraffic();
-  // Call it after noteTraffic(). Polls this window or line, too, unless PolledSet::kMax others are
-  // busier. One that is not polled wakes the event loop by its descriptor.
+  // Call them after noteTraffic(). While this object polls, it also polls this window or line,
+  // until PolledSet::kMax others were added later. One that is not polled wakes the event loop by
+  // its descriptor.
   void addWindow(Polled& window) {
     if (isPolling_) windows_.add(window);
   }

@@ -31,7 +31,7 @@ struct RouterContext {
   RouterConfig config;            // replaced by a reload
   std::shared_ptr<Tls> tls;       // nullptr: no connection uses TLS
   std::uint64_t incarnation = 0;  // distinguishes restarts of this router
-  Polling* polling = nullptr;     // nullptr: the router sleeps at once
+  Polling* polling = nullptr;     // nullptr: the router never polls
   DueWrites writes{timer};
 
   // As the functions of Polling.

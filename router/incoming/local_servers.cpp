@@ -158,7 +158,7 @@ void LocalServers::look(Binding& binding) {
   update(binding);
 }
 
-// After a look().
+// Announces what the last look() of the monitor has found.
 void LocalServers::update(Binding& binding) {
   const bool isThere = binding.monitor->isThere();
   logFailure(binding, !isThere && binding.monitor->isDoubtful());

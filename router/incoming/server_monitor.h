@@ -22,7 +22,7 @@ class ServerMonitor {
   // Calls `onChange` in two cases:
   // - The process of the server that look() found exits.
   // - look() finds a change: a known server has ended or was replaced, or a server is running after
-  //   a look() that failed. The other users of this object must then call look(), too.
+  //   a look() that failed. The other users of this object must then be told.
   // `onChange` is not called when the server ends but its process continues; isDoubtful() is then
   // true.
   ServerMonitor(Backplane backplane, ServerName name, std::function<void()> onChange);

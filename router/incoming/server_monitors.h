@@ -18,8 +18,8 @@ namespace mpf::router {
 
 class ServerMonitors {
  public:
-  // Calls `onChange` when a server may have started or ended. Then call lookAtAll(), and tell all
-  // bindings: the look() of one of them has consumed the change for the others.
+  // Calls `onChange`, in the event loop, when a server may have started or ended. Then call
+  // lookAtAll(), and let every binding read its ServerMonitor again.
   ServerMonitors(const Backplane& backplane, kj::UnixEventPort& port,
                  std::function<void()> onChange);
   ~ServerMonitors() noexcept;

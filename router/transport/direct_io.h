@@ -6,6 +6,7 @@
 // Threads  that of the stream.
 #pragma once
 
+#include <cstddef>
 #include <kj/async-io.h>
 #include <optional>
 
@@ -17,11 +18,13 @@ class DirectIo {
 
   // Without a connection: there is never anything to read, nor room.
   DirectIo() = default;
-  // `plain` outlives this object, and must not encrypt. No connection if it has no descriptor.
+  // `plain` outlives this object, and is not a TLS stream. No connection if it has no descriptor.
+  // Do not read (write) while a read (write) of the stream is pending: the order would change.
   explicit DirectIo(kj::AsyncIoStream& plain);
 
   [[nodiscard]] explicit operator bool() const noexcept { return fd_ >= 0; }
   // Returns how many bytes it has read, 0 at the end of the stream; nullopt: nothing is there now.
+  // `room` must not be empty.
   //   throws  kj::Exception, as the stream
   [[nodiscard]] std::optional<std::size_t> tryRead(kj::ArrayPtr<kj::byte> room) const;
   // Returns how many bytes it has written.

@@ -21,12 +21,13 @@ FrameWriter::FrameWriter(Owner& owner, kj::AsyncIoStream& stream, DirectIo direc
       queue_(std::move(queue)),
       onUnsendable_(std::move(onUnsendable)) {}
 
-void FrameWriter::writeDue() {
+void FrameWriter::writeDue() noexcept {
   KJ_IF_MAYBE (error, kj::runCatchingExceptions([this] { writeFrames(); }))
     owner_.onWriteFailure(*error);
 }
 
-// Leaves the rest to the stream when the kernel has no room, or the frames are long.
+// Leaves the rest to the stream when the kernel has no room or a frame exceeds kPartBytes. After
+// kPartBytes in shorter frames, the next DueWrites::run() continues.
 void FrameWriter::writeFrames() {
   std::size_t written = 0;
   while (!queue_.isEmpty()) {

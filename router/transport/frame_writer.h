@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // FrameWriter: writes the frames of a SendQueue to a stream, soon after the first item is pushed
-// (DueWrites). Plain TCP is written at once as far as the kernel takes it (DirectIo). TLS, and what
-// the kernel has no room for, are written by tasks of the event loop.
+// (DueWrites). Plain TCP is written at once as far as the kernel takes it (DirectIo). TLS, what the
+// kernel has no room for, and what follows the first MiB of a frame, are written by tasks of the
+// event loop.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -15,8 +16,9 @@
 
 namespace mpf::router {
 
-class FrameWriter final : public Writer {
+class FrameWriter final : public DueWriter {
  public:
+  // None of these functions may destroy the writer.
   class Owner {
    public:
     // Frames are built and written now. Returns their limits.
@@ -46,11 +48,12 @@ class FrameWriter final : public Writer {
     queue_.push(std::forward<Outgoing>(outgoing)...);
     if (!std::exchange(isBusy_, true)) writes_.add(*this);
   }
-  // For everything but push(). Do not empty the queue before the last write.
+  // For everything but push(). Do not empty the queue while a write is due or in
+  // progress.
   [[nodiscard]] SendQueue& queue() noexcept { return queue_; }
   [[nodiscard]] const SendQueue& queue() const noexcept { return queue_; }
 
-  void writeDue() override;
+  void writeDue() noexcept override;
 
  private:
   void writeFrames();
@@ -68,7 +71,7 @@ class FrameWriter final : public Writer {
   SendQueue queue_;
   SendQueue::OnUnsendable onUnsendable_;
   bool isBusy_ = false;  // it writes, or is due
-  kj::Promise<void> parts_ = nullptr;
+  kj::Promise<void> parts_ = nullptr;  // the task that writes the rest
 };
 
 }  // namespace mpf::router

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::int64_t kTurnNs = 2'000'000;  // longest turn with the items of one peer
 
-constexpr std::size_t kMostAtOnce = std::size_t{256} << 10;  // bytes read by one poll()
+constexpr std::size_t kEnoughBytes = std::size_t{256} << 10;  // when poll() stops reading
 
 constexpr const char* kTlsOnPlain =
     "the peer uses TLS, this side of the connection plain TCP: set the same security, \"tls\" or "
@@ -114,7 +114,7 @@ void Line::setPolled(bool isPolled) {
 
 void Line::readDirectly() {
   auto next = Next::read;
-  for (std::size_t total = 0; next == Next::read && total < kMostAtOnce;) {
+  for (std::size_t total = 0; next == Next::read && total < kEnoughBytes;) {
     const auto room = reader_.room();
     const auto bytes = direct_.tryRead(room);
     if (bytes) next = received(*bytes);
@@ -186,7 +186,7 @@ Line::Next Line::handleReceived() {
 }
 
 kj::Promise<void> Line::whenAnswersAreSent() {
-  // Let the other tasks of the event loop run, first of all the one that writes the answers.
+  // Let the other tasks of the event loop run, and the answers be written.
   if (!queue().hasMaxAnswers()) return loop_.timer.afterDelay(0 * kj::NANOSECONDS);
   auto paf = kj::newPromiseAndFulfiller<void>();
   resumeReading_ = kj::mv(paf.fulfiller);

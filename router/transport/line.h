@@ -71,7 +71,7 @@ class Line final : public Polled, private FrameWriter::Owner {
     std::function<void(const PlainItems& items)> onPlainItems{};
     // hasRoom() may have become true.
     std::function<void()> onRoom;
-    // A frame has arrived, or frames are sent; Polling knows it already. May be empty.
+    // A frame has arrived, or frames are sent; Polling was notified already. May be empty.
     std::function<void()> onTraffic{};
     // Items were handled: all that have arrived, or those of one turn. May be empty.
     std::function<void()> onHandled{};
@@ -79,11 +79,11 @@ class Line final : public Polled, private FrameWriter::Owner {
     SendQueue::OnUnsendable onUnsendable;
   };
 
-  // The event loop, for lines.
+  // What a line needs of the event loop.
   struct Loop {
     kj::Timer& timer;
     DueWrites& writes;
-    Polling* polling = nullptr;  // nullptr: the router sleeps at once
+    Polling* polling = nullptr;  // nullptr: the router never polls
   };
 
   // What `loop` refers to, and `record`, outlive this object.
@@ -130,7 +130,7 @@ class Line final : public Polled, private FrameWriter::Owner {
 
  private:
   enum class State { greeting, open, leaving, dropping, broken, finished };
-  // What follows a read.
+  // What follows a read: another one, the rest of its items, a read whose bytes are ignored.
   enum class Next { read, handle, discard, nothing };
 
   [[nodiscard]] bool isEnding() const noexcept {
@@ -180,7 +180,7 @@ class Line final : public Polled, private FrameWriter::Owner {
   Events events_;
   State state_ = State::greeting;
   bool isPolled_ = false;
-  bool pollReads_ = false;  // poll() reads the next bytes, and no task
+  bool pollReads_ = false;  // poll(), not a task, reads the next bytes
   PeerGreeting peer_;
   FrameReader reader_;
   std::optional<capnp::List<wire::Item>::Reader> items_;  // of the frame that is being handled

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""scripts/speed-tables: replaces the tables of a document, and refuses names that it does not know.
+"""scripts/speed-tables: replaces the tables of a document, and rejects unknown names of tables.
 
 Usage: speed_tables_test.py SCRIPT
 """
@@ -51,6 +51,7 @@ class SpeedTables(unittest.TestCase):
             row("Round trip of 4 B", "MPF", "spin", typical_ns=189.4, p50_ns=180),
             row("Round trip of 4 B", "Aeron (C)", "spin", disturbed=True, typical_ns=1536.2),
             row("Round trip of 4 B", "Unix socket", "spin", error="it has crashed"),
+            row("Round trip of 4 B", "iceoryx2", "spin", skipped="it is not installed"),
             row("One way, 4 B", "MPF", "spin", per_s=43_210_000),
             row("One way, 4 B", "iceoryx2 pub-sub", "spin", per_s=565_400),
         ).returncode, 0)
@@ -63,12 +64,16 @@ class SpeedTables(unittest.TestCase):
         self.assertEqual(self.line("Int32, one way"),
                          "| Int32, one way | 43.2 M/s | - | 565 k/s | - | - |")
 
-    def test_refuses_an_unknown_table(self):
+    def test_rejects_an_unknown_table(self):
         self.document.write_text(DOCUMENT.replace("readme", "peer"))
         done = self.write()
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("speed.md: no table peer: use one of peers,", done.stderr)
         self.assertIn("an old table", self.document.read_text())
+
+    def test_rejects_a_document_without_tables(self):
+        self.document.write_text("Nothing.\n")
+        self.assertIn("speed.md: has no line <!-- table NAME -->", self.write().stderr)
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ namespace {
 
 using router::DueWrites;
 
-struct Written final : router::Writer {
-  void writeDue() override {
+struct Written final : router::DueWriter {
+  void writeDue() noexcept override {
     ++writes;
     if (onWrite) onWrite();
   }
@@ -86,7 +86,7 @@ TEST_F(DueWritesTest, ThatAreAddedMeanwhileWaitForTheNextRun) {
   EXPECT_EQ(first_.writes, 2);
 }
 
-TEST_F(DueWritesTest, AreForgottenWithTheirWriter) {
+TEST_F(DueWritesTest, AreNotWrittenAfterRemove) {
   first_.onWrite = [&] { due_.remove(second_); };
   Written third;
   for (auto* const each : {&first_, &second_, &third}) due_.add(*each);

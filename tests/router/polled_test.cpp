@@ -8,7 +8,7 @@
 namespace mpf::test {
 namespace {
 
-// Is busy in each round.
+// Adds itself in each poll().
 struct Busy final : router::Polled {
   explicit Busy(router::PolledSet& of) : set(of) {}
   void poll() override {

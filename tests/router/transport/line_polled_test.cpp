@@ -113,13 +113,13 @@ TEST_F(LinePolledTest, ReadsUntilThePeerHasClosedAfterItsOwnFarewell) {
   EXPECT_EQ(end_, "the router is stopping");
 }
 
-// Each ping is answered.
+// The answers to 5000 pings exceed SendQueue::kMaxControlItems.
 TEST_F(LinePolledTest, StopsReadingFromAPeerThatDoesNotRead) {
   startToPoll();
-  writes_.setDriven(true);  // and nobody writes
+  writes_.setDriven(true);  // and nothing calls run()
   beginToSend(frameOf(std::vector<Fill>(5000, ping(1))));
 
-  while (record_->framesReceived != 3) {
+  while (record_->framesReceived != 3) {  // after the greeting and the first item
     settle();
     line_->poll();
   }
