@@ -120,7 +120,8 @@ file(MAKE_DIRECTORY "${CMAKE_BINARY_DIR}/doc/include")
 file(CREATE_LINK "${installedHeaders}" "${CMAKE_BINARY_DIR}/doc/include/mpf" SYMBOLIC)
 install(DIRECTORY "${CMAKE_BINARY_DIR}/doc/include" DESTINATION ${CMAKE_INSTALL_DOCDIR})
 # The tables of `make bench`.
-install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)
+install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL
+  FILES_MATCHING PATTERN "*.txt")
 
 # ---- programs and man pages: every executable of these folders
 

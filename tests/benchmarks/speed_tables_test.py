@@ -60,7 +60,7 @@ class SpeedTables(unittest.TestCase):
         self.assertTrue(text.startswith("Before.\n\n<!-- table readme -->\n| | MPF | Aeron C |"))
         self.assertTrue(text.endswith("|\n\nBehind.\n"))
         self.assertNotIn("an old table", text)
-        self.assertEqual(self.line("Int32"), "| Int32 | 189 ns | 1.54 us * | - | - | - |")
+        self.assertEqual(self.line("Int32"), "| Int32 | 189 ns | 1.54 us* | - | - | - |")
         self.assertEqual(self.line("Int32, one way"),
                          "| Int32, one way | 43.2 M/s | - | 565 k/s | - | - |")
 
@@ -70,6 +70,10 @@ class SpeedTables(unittest.TestCase):
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("speed.md: no table peer: use one of peers,", done.stderr)
         self.assertIn("an old table", self.document.read_text())
+
+    def test_names_a_benchmark_that_was_not_run(self):
+        self.document.write_text(DOCUMENT.replace("readme", "between hosts"))
+        self.assertIn("run `make bench BENCH=remote`", self.write().stderr)
 
     def test_rejects_a_document_without_tables(self):
         self.document.write_text("Nothing.\n")
