@@ -17,6 +17,9 @@ namespace {
 constexpr std::int64_t kTurnNs = 2'000'000;  // longest turn with the items of one peer
 
 constexpr std::size_t kEnoughBytes = std::size_t{256} << 10;  // when poll() stops reading
+// After so many polls without bytes (about 1 ms), poll() leaves the reading to a task. Otherwise it
+// would delay other lines by a system call in each turn.
+constexpr std::uint32_t kIdlePolls = 256;
 
 constexpr const char* kTlsOnPlain =
     "the peer uses TLS, this side of the connection plain TCP: set the same security, \"tls\" or "
@@ -37,7 +40,8 @@ Line::Line(kj::Own<kj::AsyncIoStream> stream, Security security, const Loop& loo
               events_.onUnsendable),
       keepAlive_(limits) {}
 
-Line::~Line() {
+void Line::endPolling() noexcept {
+  isPolled_ = false;
   if (loop_.polling != nullptr) loop_.polling->remove(*this);
 }
 
@@ -114,13 +118,16 @@ void Line::setPolled(bool isPolled) {
 
 void Line::readDirectly() {
   auto next = Next::read;
-  for (std::size_t total = 0; next == Next::read && total < kEnoughBytes;) {
+  std::size_t total = 0;
+  while (next == Next::read && total < kEnoughBytes) {
     const auto room = reader_.room();
     const auto bytes = direct_.tryRead(room);
+    total += bytes.value_or(0);
     if (bytes) next = received(*bytes);
     if (bytes != room.size()) break;
-    total += *bytes;
   }
+  idlePolls_ = total == 0 ? idlePolls_ + 1 : 0;
+  if (idlePolls_ >= kIdlePolls) endPolling();
   pollReads_ = next == Next::read && isPolled_;
   if (!pollReads_) reads_ = watched([this, next] { return proceed(next); });
 }
@@ -309,10 +316,6 @@ void Line::takeGreeting(wire::Greeting::Reader greeting) {
 
 // ---- writing
 
-void Line::send(FillItem fill) {
-  if (!isEnding()) writer_.push(std::move(fill), origin_);
-}
-
 void Line::send(Carried carried) {
   if (isEnding()) queue().reject(std::move(carried));
   else writer_.push(std::move(carried));
@@ -342,11 +345,6 @@ void Line::noteTraffic() {
     if (direct_) loop_.polling->addLine(*this);
   }
   if (events_.onTraffic) events_.onTraffic();
-}
-
-// While reading is suspended, it is the only sign of life.
-void Line::onPart() {
-  if (resumeReading_) keepAlive_.received(Clock::nowNs());
 }
 
 void Line::onWritten() {

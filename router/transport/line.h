@@ -33,6 +33,8 @@
 #include <string>
 #include <vector>
 
+#include <mpf/clock.h>
+
 #include "router/config/router_config.h"
 #include "router/polling.h"
 #include "router/protocol_error.h"
@@ -89,7 +91,7 @@ class Line final : public Polled, private FrameWriter::Owner {
   // What `loop` refers to, and `record`, outlive this object.
   Line(kj::Own<kj::AsyncIoStream> stream, Security security, const Loop& loop, const Limits& limits,
        PeerRecord& record, Events events);
-  ~Line();
+  ~Line() { endPolling(); }
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
@@ -101,7 +103,9 @@ class Line final : public Polled, private FrameWriter::Owner {
 
   // Queues an item that is not a message, even without room. Answers to items of the peer are
   // bounded: when too many wait, no more is read from the peer.
-  void send(FillItem fill);
+  void send(FillItem fill) {
+    if (!isEnding()) writer_.push(std::move(fill), origin_);
+  }
   // Queues a message, even without room. A caller that can wait checks hasRoom() first.
   void send(Carried carried);
   void send(const PlainOutgoing& item);
@@ -147,6 +151,7 @@ class Line final : public Polled, private FrameWriter::Owner {
   kj::Promise<void> readLoop();
   kj::Promise<void> readAndDiscard();
   void readDirectly();
+  void endPolling() noexcept;
   Next received(std::size_t bytes);
   Next handleReceived();
   kj::Promise<void> proceed(Next next);
@@ -161,7 +166,10 @@ class Line final : public Polled, private FrameWriter::Owner {
   [[nodiscard]] SendQueue& queue() noexcept { return writer_.queue(); }
   [[nodiscard]] const SendQueue& queue() const noexcept { return writer_.queue(); }
   SendQueue::FrameLimits onFrames() override;
-  void onPart() override;
+  // While reading is suspended, it is the only sign of life.
+  void onPart() override {
+    if (resumeReading_) keepAlive_.received(Clock::nowNs());
+  }
   void onWritten() override;
   void onIdle() override;
   void noteTraffic();
@@ -180,6 +188,7 @@ class Line final : public Polled, private FrameWriter::Owner {
   Events events_;
   State state_ = State::greeting;
   bool isPolled_ = false;
+  std::uint32_t idlePolls_ = 0;  // since poll() has read bytes
   bool pollReads_ = false;  // poll(), not a task, reads the next bytes
   PeerGreeting peer_;
   FrameReader reader_;

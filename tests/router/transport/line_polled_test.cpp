@@ -65,6 +65,19 @@ TEST_F(LinePolledTest, IsReadByATaskAfterwards) {
   EXPECT_THAT(said_.back(), HasSubstr("close = 3"));
 }
 
+TEST_F(LinePolledTest, IsReadByATaskAfterManyPollsWithoutBytes) {
+  startToPoll();
+  for (int i = 0; i < 255; ++i) line_->poll();
+  sendAndWait(closeItem(2));
+  line_->poll();
+  EXPECT_THAT(said_, SizeIs(1)) << "by poll()";
+
+  for (int i = 0; i < 256; ++i) line_->poll();
+  sendAndWait(closeItem(3));
+
+  EXPECT_THAT(said_, SizeIs(2)) << "by a task";
+}
+
 TEST_F(LinePolledTest, ReadsAFrameThatArrivesInParts) {
   startToPoll();
   const auto frame = frameOf({closeItem(2)});
