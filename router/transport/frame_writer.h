@@ -48,8 +48,7 @@ class FrameWriter final : public DueWriter {
     queue_.push(std::forward<Outgoing>(outgoing)...);
     if (!std::exchange(isBusy_, true)) writes_.add(*this);
   }
-  // For everything but push(). Do not empty the queue while a write is due or in
-  // progress.
+  // For everything but push(). Do not empty the queue while a write is due or in progress.
   [[nodiscard]] SendQueue& queue() noexcept { return queue_; }
   [[nodiscard]] const SendQueue& queue() const noexcept { return queue_; }
 

@@ -160,7 +160,7 @@ class LineTest : public testing::Test {
   layout::RouterLine row_{};
   router::PeerRecord record_{row_};
   router::DueWrites writes_{io_.provider->getTimer()};
-  router::Polling* polling_ = nullptr;  // set it before start()
+  router::Polling* polling_ = nullptr;  // set it before start(), and hang up before it ends
   std::unique_ptr<Line> line_;
   std::vector<std::string> said_;  // what the line has reported
   std::string end_;                // why the line ended; empty: it has not

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Line: while a router polls it, and when the kernel has no room for what it writes.
+#include <unistd.h>
+
 #include "tests/router/transport/line_fixture.h"
+#include "tests/support/replaced_yield.h"
 
 namespace mpf::test {
 namespace {
@@ -19,9 +22,13 @@ class LinePolledTest : public LineTest {
   ~LinePolledTest() noexcept override = default;
 
   void SetUp() override {
+    restartWithSockets();
+    startGreeted();
+  }
+  void restartWithSockets() {
+    restart();
     pipe_ = io_.provider->newTwoWayPipe();  // of the kernel, so that it has descriptors
     peer_ = kj::mv(pipe_.ends[1]);
-    startGreeted();
   }
   // The read that a task has begun takes the first item. The next ones are left to poll().
   void startToPoll() {
@@ -30,9 +37,11 @@ class LinePolledTest : public LineTest {
     EXPECT_THAT(said_, SizeIs(1));
     said_.clear();
   }
+  // Ends when the tasks are done that this item and the timers before it have made ready.
   void sendAndWait(const Fill& item) {
     send(frameOf({item}));
     io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope);
+    settle();
   }
 };
 
@@ -49,6 +58,42 @@ TEST_F(LinePolledTest, IsReadByPoll) {
   }
   line_->poll();
   EXPECT_THAT(said_, IsEmpty());
+}
+
+// A window is polled after the lines. In the turn in which the item was sent, no task has read it.
+TEST_F(LinePolledTest, IsReadInTheTurnsOfARouterThatPolls) {
+  struct Window final : router::Polled {
+    explicit Window(std::function<void()> onPoll) : look(std::move(onPoll)) {}
+    void poll() override {
+      if (isPolled) look();  // the last poll() is of no turn
+    }
+    void setPolled(bool polled) override { isPolled = polled; }
+    std::function<void()> look;
+    bool isPolled = false;
+  };
+  restartWithSockets();
+  router::Polling polling(io_.unixEventPort, writes_);
+  polling_ = &polling;
+  startGreeted();
+  const auto frame = frameOf({closeItem(2)});
+  std::size_t before = SIZE_MAX;
+  bool isRead = false;
+  Window window([&] { isRead = isRead || said_.size() > before; });
+  const auto peer = KJ_ASSERT_NONNULL(peer_->getFd());
+  const std::function<void()> sendInTurn = [&] {
+    before = said_.size();
+    EXPECT_EQ(::write(peer, frame.data(), frame.size()), std::ssize(frame));
+  };
+  {
+    const ReplacedYield replaced(sendInTurn);
+    while (!isRead) {
+      polling.noteTraffic();
+      polling.addWindow(window);
+      io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope);
+    }
+  }
+  hangUp();
+  polling.remove(window);
 }
 
 TEST_F(LinePolledTest, IsReadByATaskAfterwards) {
