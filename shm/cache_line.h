@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // lines: fetches cache lines for this processor before it writes to them, and moves written lines
-// to the shared cache. The data stay the same.
+// to the shared cache.
 //
 // A line that another processor has read must come back before a write to it takes effect. An Intel
 // processor fetches it with prefetchw, without waiting (those before Broadwell ignore prefetchw).
-// On an AMD processor (Zen 3), prefetchw does not fetch such a line; only a write does.
+// On an AMD processor (Zen 3), prefetchw is too slow for a line that is written soon after: there,
+// only a write fetches it in time.
 //
 // Threads  request(), offer(): any; claim(): the thread that may write the field.
 #pragma once
@@ -33,13 +34,12 @@ inline void request(const void* address) noexcept {
 #endif
 }
 
-// Fetches the line of a field for writing. Where request() has no effect, this writes what is there
-// already.
+// Fetches the line of a field for writing. Its value is lost where request() has no effect.
 template <class T>
 void claim(T& field) noexcept {
   if (requestsReadLines()) return request(&field);
-  volatile T& same = field;
-  same = same;  // NOLINT(misc-redundant-expression): reads and writes
+  volatile T& mine = field;
+  mine = T{};  // without a read, which would fetch the line once more
 }
 
 // Moves the line at `address` from this processor to the cache that all processors share, from

@@ -159,11 +159,13 @@ class RingProducer {
   }
 
  private:
-  // Lines to claim at once, until the next look at the consumer. In a stream, many: its consumer
-  // keeps a distance. Otherwise few: the consumer may be about to read a slot that waits for the
-  // transfers of these lines. None for round trips one by one: the consumer polls
-  // the next slot and takes its line back at once. There, expectPush() requests the next line.
-  static constexpr std::uint64_t kFewClaimed = 8, kManyClaimed = 32;
+  // How many slots further the consumer is looked at again, and lines are fetched. None are fetched
+  // for round trips one by one: the consumer polls the next slot and takes its line back at once.
+  // There, expectPush() requests the next line.
+  //   near     the consumer may be about to read a slot that waits for the transfers of these lines
+  //   stream   the consumer keeps a distance
+  static constexpr std::uint64_t kClaimedNear = 8, kClaimedInStream = 16;
+  static constexpr std::uint64_t kRequestedInStream = 48;  // slots, behind those that come first
   static constexpr std::uint64_t kLookEvery = 16;  // slots, if no lines are claimed
   static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
   // Whether this side was idle before nearly each of the messages since the last call.
@@ -178,7 +180,7 @@ class RingProducer {
     const auto freed =
         std::clamp(consumer_.freed.load(std::memory_order_acquire), freeEnd_ - usable_, pushed_);
     freeEnd_ = freed + usable_;
-    claim_ = isOneByOne() ? 0 : pushed_ - freed < kFarAhead ? kFewClaimed : kManyClaimed;
+    claim_ = isOneByOne() ? 0 : pushed_ - freed < kFarAhead ? kClaimedNear : kClaimedInStream;
     return pushed_ + count <= freeEnd_ || (canMove() && tryMove() && count <= usable_);
   }
   // Continues in the second ring, which is empty, if it has memory.
@@ -198,9 +200,11 @@ class RingProducer {
     MPF_STEP(ring_moved);
     return true;
   }
-  // Claims the lines of the next slots at once, so that their transfers from the consumer's
-  // processor overlap; those of messages do not, because the stores of one message fill the store
-  // buffer. If claim_ is 0, only looks where the consumer polls.
+  // Fetches the lines of free slots, so that their transfers from the consumer's processor overlap;
+  // those of messages do not, because the stores of one message fill the store buffer. In a stream,
+  // each line is requested up to three times, early enough to arrive while other slots are filled.
+  // Near the consumer, that would take lines from it that it still reads; there, the next lines are
+  // claimed. If claim_ is 0, only looks where the consumer polls.
   [[gnu::noinline]] void claimLines() noexcept {
     const auto polledOn = polledOn_ != nullptr ? polledOn_->load(std::memory_order_relaxed) : 0;
     const auto here = lines::thisProcessor();
@@ -208,8 +212,13 @@ class RingProducer {
     claimed_ = std::min(freeEnd_, pushed_ + (claim_ == 0 ? kLookEvery : claim_));
     if (claim_ == 0) return;
     if (claimed_ == freeEnd_) __builtin_prefetch(&consumer_.freed);  // hasFreed() looks at it soon
-    for (auto position = pushed_; position < claimed_; ++position)
-      lines::claim(slot(position).type);
+    if (claim_ == kClaimedNear) {
+      for (auto position = pushed_; position < claimed_; ++position)
+        lines::claim(slot(position).type);
+      return;
+    }
+    const auto end = std::min(freeEnd_, claimed_ + kRequestedInStream);
+    for (auto position = claimed_; position < end; ++position) lines::request(&slot(position));
   }
 
   [[gnu::always_inline]] void publish(layout::Slot& first, std::uint32_t slots) noexcept {
@@ -256,7 +265,7 @@ class RingProducer {
   std::uint64_t freeEnd_ = usable_;
   std::uint64_t pushed_ = 0;  // slots
   std::atomic<layout::Slot*> next_;  // slot(pushed_)
-  // Lines that are claimed at once; 0: none, as in the first lap, whose lines nobody has read.
+  // kClaimedNear, kClaimedInStream, or 0, as in the first lap, whose lines nobody has read.
   std::uint64_t claim_ = 0;
   std::uint64_t claimed_ = 0;  // the position of the next claim
   bool isPolledElsewhere_ = false;  // at the last claim
