@@ -280,17 +280,22 @@ void Ip330::deliver(const Ip330Sample& sample) {
 }
 
 Ip330::Subscription Ip330::subscribe(Subscriber subscriber) {
+  const auto at = add(std::move(subscriber));
+  // Without the lock: if there is no memory for the handle, it calls its deleter.
+  return {nullptr, [this, at](void*) {
+            const Lock lock(subscribersMutex_);
+            subscribers_.erase(at);
+          }};
+}
+
+std::list<Ip330::Subscriber>::iterator Ip330::add(Subscriber subscriber) {
   const auto most = static_cast<std::size_t>(settings().maxClients);
   const Lock lock(subscribersMutex_);
   if (subscribers_.size() >= most)
     throw std::length_error(fmt::format(
         "{} already has {} clients, which is the limit; raise the maximum number of clients",
         module_.name(), most));
-  const auto at = subscribers_.insert(subscribers_.end(), std::move(subscriber));
-  return {nullptr, [this, at](void*) {
-            const Lock ending(subscribersMutex_);
-            subscribers_.erase(at);
-          }};
+  return subscribers_.insert(subscribers_.end(), std::move(subscriber));
 }
 
 // ---- the keeper

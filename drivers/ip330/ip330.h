@@ -167,6 +167,7 @@ class Ip330 {
   [[nodiscard]] bool serve(InterruptThread::Cause cause);
   void noteCause(InterruptThread::Cause cause);
   void deliver(const Ip330Sample& sample);
+  std::list<Subscriber>::iterator add(Subscriber subscriber);
   void keep(const std::stop_token& stop);
   void look();
   void lookForBoard();
