@@ -54,6 +54,7 @@ class SpeedTables(unittest.TestCase):
             row("Round trip of 4 B", "iceoryx2", "spin", skipped="it is not installed"),
             row("One way, 4 B", "MPF", "spin", per_s=43_210_000),
             row("One way, 4 B", "iceoryx2 pub-sub", "spin", per_s=565_400),
+            row("Round trip of 1 MiB, untouched", "MPF", "spin", disturbed=True, typical_ns=421),
         ).returncode, 0)
 
         text = self.document.read_text()
@@ -63,6 +64,9 @@ class SpeedTables(unittest.TestCase):
         self.assertEqual(self.line("Int32"), "| Int32 | 189 ns | 1.54 us* | - | - | - |")
         self.assertEqual(self.line("Int32, one way"),
                          "| Int32, one way | 43.2 M/s | - | 565 k/s | - | - |")
+        self.assertEqual(self.line("1 MiB, untouched*"),
+                         "| 1 MiB, untouched* | 421 ns | - | - | - | - |")
+        self.assertEqual(self.line("Int32, asleep"), "| Int32, asleep | - | - | - | - | - |")
 
     def test_rejects_an_unknown_table(self):
         self.document.write_text(DOCUMENT.replace("readme", "peer"))
