@@ -84,7 +84,7 @@ class RingProducer {
                                                       std::span<const std::byte> body,
                                                       std::uint32_t reserve) noexcept {
     if (!hasFree(1 + reserve)) return false;
-    if (pushed_ >= claimed_) claimLines();
+    if (pushed_ >= stepEnd_) fetchLines();
     auto& first = next();
     EnvelopeWords::of(envelope(), 1, bodyBytes).copyTo(first);
     if (body.size() == layout::kFirstSlotBodyBytes) [[likely]]
@@ -95,7 +95,7 @@ class RingProducer {
     return true;
   }
   // Pushes messages whose bodies fill a slot each and lie one after the other. Stops after `most`
-  // messages, before fewer than `reserve` slots would be free, or at the next claim of lines.
+  // messages, before fewer than `reserve` slots would be free, or at the end of the step.
   // Returns the number of messages; 0 if fewer than 1 + `reserve` slots are free. For each, calls
   // `words(index)`, which returns its envelope, and then `pushed(messages)`.
   template <class MakeWords, class Pushed>
@@ -104,8 +104,8 @@ class RingProducer {
                                                         std::uint32_t reserve,
                                                         const Pushed& pushed) noexcept {
     if (most == 0 || !hasFree(1 + reserve)) return 0;
-    if (pushed_ >= claimed_) claimLines();
-    const auto count = std::min({most, freeEnd_ - reserve - pushed_, claimed_ - pushed_});
+    if (pushed_ >= stepEnd_) fetchLines();
+    const auto count = std::min({most, freeEnd_ - reserve - pushed_, stepEnd_ - pushed_});
     auto position = pushed_;
     for (std::size_t index = 0; index != count; ++index) {
       auto& message = slot(position);
@@ -124,7 +124,7 @@ class RingProducer {
     next_.store(&slot(pushed_), std::memory_order_relaxed);
     return count;
   }
-  // Whether the consumer polled the ring on another processor, at the last claim.
+  // Whether the consumer polled the ring on another processor, at the last look.
   [[nodiscard]] bool isPolledElsewhere() const noexcept { return isPolledElsewhere_; }
 
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
@@ -159,12 +159,12 @@ class RingProducer {
   }
 
  private:
-  // How many slots further the consumer is looked at again, and lines are fetched. None are fetched
+  // Steps: after so many slots, lines are fetched and the consumer is looked at. None are fetched
   // for round trips one by one: the consumer polls the next slot and takes its line back at once.
   // There, expectPush() requests the next line.
   //   near     the consumer may be about to read a slot that waits for the transfers of these lines
   //   stream   the consumer keeps a distance
-  static constexpr std::uint64_t kClaimedNear = 8, kClaimedInStream = 16;
+  static constexpr std::uint64_t kStepNear = 8, kStepInStream = 16;
   static constexpr std::uint64_t kRequestedInStream = 48;  // slots, behind those that come first
   static constexpr std::uint64_t kLookEvery = 16;  // slots, if no lines are claimed
   static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
@@ -180,7 +180,7 @@ class RingProducer {
     const auto freed =
         std::clamp(consumer_.freed.load(std::memory_order_acquire), freeEnd_ - usable_, pushed_);
     freeEnd_ = freed + usable_;
-    claim_ = isOneByOne() ? 0 : pushed_ - freed < kFarAhead ? kClaimedNear : kClaimedInStream;
+    step_ = isOneByOne() ? 0 : pushed_ - freed < kFarAhead ? kStepNear : kStepInStream;
     return pushed_ + count <= freeEnd_ || (canMove() && tryMove() && count <= usable_);
   }
   // Continues in the second ring, which is empty, if it has memory.
@@ -193,7 +193,7 @@ class RingProducer {
     usable_ = second_.capacity;
     mask_ = usable_ - 1;
     freeEnd_ = pushed_ + usable_;
-    claim_ = 0;
+    step_ = 0;
     next_.store(&slot(pushed_), std::memory_order_relaxed);
     // PAIR(slot-filled): a consumer that sees this sequence continues in the second ring.
     last.sequence.store(layout::kContinuesInSecondRing | (pushed_ + 1), std::memory_order_release);
@@ -204,21 +204,21 @@ class RingProducer {
   // those of messages do not, because the stores of one message fill the store buffer. In a stream,
   // each line is requested up to three times, early enough to arrive while other slots are filled.
   // Near the consumer, that would take lines from it that it still reads; there, the next lines are
-  // claimed. If claim_ is 0, only looks where the consumer polls.
-  [[gnu::noinline]] void claimLines() noexcept {
+  // claimed. If step_ is 0, only looks where the consumer polls.
+  [[gnu::noinline]] void fetchLines() noexcept {
     const auto polledOn = polledOn_ != nullptr ? polledOn_->load(std::memory_order_relaxed) : 0;
     const auto here = lines::thisProcessor();
     isPolledElsewhere_ = polledOn != 0 && here != 0 && polledOn != here;
-    claimed_ = std::min(freeEnd_, pushed_ + (claim_ == 0 ? kLookEvery : claim_));
-    if (claim_ == 0) return;
-    if (claimed_ == freeEnd_) __builtin_prefetch(&consumer_.freed);  // hasFreed() looks at it soon
-    if (claim_ == kClaimedNear) {
-      for (auto position = pushed_; position < claimed_; ++position)
+    stepEnd_ = std::min(freeEnd_, pushed_ + (step_ == 0 ? kLookEvery : step_));
+    if (step_ == 0) return;
+    if (stepEnd_ == freeEnd_) __builtin_prefetch(&consumer_.freed);  // hasFreed() looks at it soon
+    if (step_ == kStepNear) {
+      for (auto position = pushed_; position < stepEnd_; ++position)
         lines::claim(slot(position).type);
       return;
     }
-    const auto end = std::min(freeEnd_, claimed_ + kRequestedInStream);
-    for (auto position = claimed_; position < end; ++position) lines::request(&slot(position));
+    const auto end = std::min(freeEnd_, stepEnd_ + kRequestedInStream);
+    for (auto position = stepEnd_; position < end; ++position) lines::request(&slot(position));
   }
 
   [[gnu::always_inline]] void publish(layout::Slot& first, std::uint32_t slots) noexcept {
@@ -265,10 +265,10 @@ class RingProducer {
   std::uint64_t freeEnd_ = usable_;
   std::uint64_t pushed_ = 0;  // slots
   std::atomic<layout::Slot*> next_;  // slot(pushed_)
-  // kClaimedNear, kClaimedInStream, or 0, as in the first lap, whose lines nobody has read.
-  std::uint64_t claim_ = 0;
-  std::uint64_t claimed_ = 0;  // the position of the next claim
-  bool isPolledElsewhere_ = false;  // at the last claim
+  // kStepNear, kStepInStream, or 0, as in the first lap, whose lines nobody has read.
+  std::uint64_t step_ = 0;
+  std::uint64_t stepEnd_ = 0;  // the position of the next fetchLines()
+  bool isPolledElsewhere_ = false;  // at the last look
   std::uint64_t judged_ = 0;  // messages at the last call of isOneByOne()
   std::uint64_t idleSeen_ = 0;  // timesIdle() then
   std::uint64_t messages_ = 0;  // stored and read by other threads atomically
