@@ -2,10 +2,10 @@
 // lines: fetches cache lines for this processor before it writes to them, and moves written lines
 // to the shared cache.
 //
-// A line that another processor has read must come back before a write to it takes effect. An Intel
-// processor fetches it with prefetchw, without waiting (those before Broadwell ignore prefetchw).
-// On an AMD processor (Zen 3), prefetchw is too slow for a line that is written soon after: there,
-// only a write fetches it in time.
+// A line that another processor has read must come back before a write to it takes effect.
+// prefetchw fetches it without waiting (Intel processors before Broadwell ignore it). On an AMD
+// processor (Zen 3) this takes longer than a message: the lines of the next messages of a stream
+// come in time only if they are requested far ahead, or written to.
 //
 // Threads  request(), offer(): any; claim(): the thread that may write the field.
 #pragma once
@@ -16,7 +16,7 @@
 
 namespace mpf::lines {
 
-// Fetches the line at `address` for writing, if the processor can do this without a write.
+// Fetches the line at `address` for writing.
 inline void request(const void* address) noexcept {
 #if defined(__x86_64__)
   asm volatile("prefetchw %0" : : "m"(*static_cast<const char*>(address)));
@@ -25,19 +25,12 @@ inline void request(const void* address) noexcept {
 #endif
 }
 
-// Whether request() also fetches lines that other processors have read.
-[[nodiscard]] inline bool requestsReadLines() noexcept {
-#if defined(__x86_64__)
-  return __builtin_cpu_is("intel") != 0;
-#else
-  return false;
-#endif
-}
-
-// Fetches the line of a field for writing. Its value is lost where request() has no effect.
+// Fetches the line of a field that is written soon. Its value may be lost.
 template <class T>
 void claim(T& field) noexcept {
-  if (requestsReadLines()) return request(&field);
+#if defined(__x86_64__)
+  if (__builtin_cpu_is("intel")) return request(&field);
+#endif
   volatile T& mine = field;
   mine = T{};  // without a read, which would fetch the line once more
 }

@@ -130,7 +130,7 @@ class RingProducer {
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
   // message and will probably send one. Any thread.
   void expectPush() const noexcept {
-    if (lines::requestsReadLines()) lines::request(&next());
+    lines::request(&next());
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
