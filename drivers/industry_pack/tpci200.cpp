@@ -174,6 +174,7 @@ IndustryPackSite& Tpci200::site(std::size_t number) {
   const std::lock_guard lock(sitesMutex_);
   auto& site = sites_.at(number);
   if (!site) {
+    if (!thread_.joinable()) startThread();
     claim(number);
     site = std::make_unique<Tpci200Site>(*this, number);
   }
@@ -190,18 +191,27 @@ void Tpci200::claim(std::size_t number) {
   board_.setLines(number, 0);  // the previous process may have been killed
 }
 
-void Tpci200::watch(int priority) {
-  const std::lock_guard lock(sitesMutex_);
-  if (!thread_.joinable()) {
-    const SignalsBlocked blocked;
-    thread_ = std::jthread([this, priority](const std::stop_token& stop) { run(stop, priority); });
-  } else if (isPolled_.load(std::memory_order_relaxed)) {
-    ::eventfd_write(wakeUp_.get(), 1);
-  }
+// Before a line is enabled, because enable() cannot report a failure.
+void Tpci200::startThread() {
+  const SignalsBlocked blocked;
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
-void Tpci200::run(const std::stop_token& stop, int priority) {
-  RealTimePriority realTime(priority);
+void Tpci200::watch(int priority) noexcept {
+  auto none = kNoLine;
+  const bool isFirst = priority_.compare_exchange_strong(none, priority, std::memory_order_relaxed);
+  if (isFirst || isPolled_.load(std::memory_order_relaxed)) ::eventfd_write(wakeUp_.get(), 1);
+}
+
+int Tpci200::awaitLine(const std::stop_token& stop) {
+  pollfd woken{.fd = wakeUp_.get(), .events = POLLIN, .revents = 0};
+  while (priority_.load(std::memory_order_relaxed) == kNoLine && !stop.stop_requested())
+    ::poll(&woken, 1, -1);
+  return priority_.load(std::memory_order_relaxed);
+}
+
+void Tpci200::run(const std::stop_token& stop) {
+  RealTimePriority realTime(awaitLine(stop));
   while (!stop.stop_requested()) {
     if (!interrupt_) serve();
     wait();

@@ -12,8 +12,8 @@
 // cycle that no module answers reads ones.
 //
 // Threads  any number of callers at a time; accesses of one process to one board are serialised.
-//          The thread starts with the first enable() of an interrupt and has the real-time priority
-//          of that interrupt where the process may set it.
+//          The thread begins its work with the first enable() of an interrupt, and has the real-time
+//          priority of that interrupt where the process may set it.
 // Crash    site() locks the site for this process, until the process ends, and masks its
 //          interrupts. The other processes on the board mask the lines of a site that has no
 //          process.
@@ -68,16 +68,19 @@ class Tpci200 final : public IndustryPackCarrier {
   [[nodiscard]] std::string description() const override { return pci_.description(); }
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] std::size_t siteCount() const noexcept override { return kSites; }
-  //   throws  std::runtime_error when another process has the site
+  //   throws  std::runtime_error when another process has the site, or no thread can be started
   [[nodiscard]] IndustryPackSite& site(std::size_t number) override;
 
  private:
   friend class Tpci200Site;
   void openInterrupt();
   void claim(std::size_t number);
-  // Called when a line with that priority was enabled: starts or wakes the thread.
-  void watch(int priority);
-  void run(const std::stop_token& stop, int priority);
+  void startThread();
+  // Called when a line with that priority was enabled: wakes the thread if it must look.
+  void watch(int priority) noexcept;
+  void run(const std::stop_token& stop);
+  // Waits for the first enable(). Returns the priority of that interrupt.
+  int awaitLine(const std::stop_token& stop);
   void wait();
   void takeInterrupt();
   // Announces the active lines of this process's sites. Returns whether lines of other sites are
@@ -95,6 +98,8 @@ class Tpci200 final : public IndustryPackCarrier {
   std::atomic<bool> isPolled_{false};
   std::string remark_;
   FileDescriptor wakeUp_;
+  static constexpr int kNoLine = -1;
+  std::atomic<int> priority_{kNoLine};  // of the line that was enabled first
   std::mutex sitesMutex_;
   std::array<std::unique_ptr<Tpci200Site>, kSites> sites_;
   std::jthread thread_;  // last: ends before the members that it uses
