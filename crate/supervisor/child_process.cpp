@@ -59,15 +59,19 @@ User userOf(const ProcessPlan& plan) {
 // Everything that the child needs, prepared before the fork: it may call only functions that are
 // safe in a signal handler.
 struct Image {
-  Image(const ProcessPlan& plan, const std::string& notifySocket) : command(plan.command) {
+  Image(const ProcessPlan& plan, const User& user, const std::string& notifySocket)
+      : command(plan.command) {
+    auto values = plan.environment;  // those of the plan come first: insert() keeps them
+    if (!user.name.empty())
+      values.insert({{"HOME", user.home}, {"USER", user.name}, {"LOGNAME", user.name}});
     for (char** one = environ; *one != nullptr; ++one) {
       const std::string text = *one;
       const auto name = text.substr(0, text.find('='));
       if (name != "NOTIFY_SOCKET" && name != "WATCHDOG_USEC" && name != "WATCHDOG_PID" &&
-          !plan.environment.contains(name))
+          !values.contains(name))
         environment.push_back(text);
     }
-    for (const auto& [name, value] : plan.environment)
+    for (const auto& [name, value] : values)
       environment.push_back(fmt::format("{}={}", name, value));
     if (plan.notifies) environment.push_back("NOTIFY_SOCKET=" + notifySocket);
     for (auto& word : command) arguments.push_back(word.data());
@@ -113,7 +117,7 @@ ChildProcess::ChildProcess(const ProcessPlan& plan, const std::string& log,
   const FileDescriptor logFile(
       checkCall(::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600), "open", log));
   const auto user = userOf(plan);
-  const Image image(plan, notifySocket);
+  const Image image(plan, user, notifySocket);
   const auto folder = plan.workingFolder.empty() ? std::string(".") : plan.workingFolder;
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): after what it needs
   pid_ = checkCall(::fork(), "fork");

@@ -40,7 +40,9 @@ CrateState CrateState::read(const std::string& path) try {
 std::vector<RecordedProcess> CrateState::running() const {
   auto running = processes;
   std::erase_if(running, [](const RecordedProcess& process) {
-    return process.pid == 0 || startTicksOf(process.pid) != process.startTicks;
+    // startTicks 0: it had ended when it was recorded
+    return process.pid == 0 || process.startTicks == 0 ||
+           startTicksOf(process.pid) != process.startTicks;
   });
   return running;
 }

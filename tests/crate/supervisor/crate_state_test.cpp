@@ -2,9 +2,12 @@
 // CrateState: written and read; damaged files and files of another boot.
 #include "crate/supervisor/crate_state.h"
 
+#include <unistd.h>
+
 #include <gtest/gtest.h>
 
 #include "base/whole_file.h"
+#include "crate/supervisor/child_process.h"
 #include "tests/support/no_descriptors.h"
 #include "tests/support/temporary_folder.h"
 
@@ -36,6 +39,18 @@ TEST_F(CrateStateTest, IsReadAsItWasWritten) {
   EXPECT_EQ(one.command, "mpf-x 'a b'");
   EXPECT_TRUE(one.isStopRequested);
   EXPECT_EQ(one.context, "user=''");
+}
+
+TEST_F(CrateStateTest, AProcessThatHasEndedIsNotRunning) {
+  constexpr pid_t kNone = 999'999'999;
+  state_.processes = {{"ended when recorded", kNone, 0, 0, "", false, ""},
+                      {"ended later", kNone, 345, 0, "", false, ""},
+                      {"running", ::getpid(), startTicksOf(::getpid()), 0, "", false, ""}};
+
+  const auto running = state_.running();
+
+  ASSERT_EQ(running.size(), 1U);
+  EXPECT_EQ(running[0].name, "running");
 }
 
 TEST_F(CrateStateTest, OfAnOlderVersionHasNoContext) {
