@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <nanobind/nanobind.h>
 #include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "python/extension/field_access.h"
@@ -100,18 +102,32 @@ std::size_t lengthOf(const PyArray<T>& array) {
   return BufferView(array.values).bytes().size() / sizeof(typename T::Element);
 }
 
+// Raises TypeError unless the elements are real numbers. Numpy would convert others, too: it drops
+// the imaginary parts of complex numbers, and counts the days of dates.
+template <class T>
+void checkNumbers(nb::handle elements) {
+  const auto type = elements.attr("dtype");
+  constexpr std::string_view kNumbers = "biufO";  // `kind` of a dtype; numpy converts objects or fails
+  if (kNumbers.find(nb::cast<std::string>(type.attr("kind"))) != std::string_view::npos) return;
+  PyErr_Format(PyExc_TypeError, "%s: the elements must be real numbers, not %U", kClassName<T>,
+               nb::object(type.attr("name")).ptr());
+  throw nb::python_error();
+}
+
 // Sets the elements of a message that Python creates.
 template <class T>
 void setValues(PyArray<T>& array, nb::handle value) {
   const CallsPython guard;
   if constexpr (CountedInElements<T>) {
-    array.values = numpy(Numpy::asArray)(value, numpy(kElementType<T>), "C");
-    const auto dimensions = nb::cast<int>(array.values.attr("ndim"));
+    const nb::object given = numpy(Numpy::asArray)(value);
+    const auto dimensions = nb::cast<int>(given.attr("ndim"));
     if (dimensions == 0) raiseWrongType({kClassName<T>, "value"}, "an array", value);
-    if (std::is_same_v<T, Int32Array> && !array.values.is(value) &&
-        !nb::cast<bool>(numpy(Numpy::arrayEqual)(array.values, value)))
-      throw nb::value_error("the elements are not 32-bit integers");
     if (dimensions != 1) throw nb::value_error("the elements must have one dimension");
+    checkNumbers<T>(given);
+    array.values = numpy(Numpy::asArray)(given, numpy(kElementType<T>), "C");
+    if (std::is_same_v<T, Int32Array> && !array.values.is(given) &&
+        !nb::cast<bool>(numpy(Numpy::arrayEqual)(array.values, given)))
+      throw nb::value_error("the elements are not 32-bit integers");
   } else {
     array.values = nb::isinstance<nb::str>(value) ? value.attr("encode")() : nb::borrow(value);
     static_cast<void>(lengthOf(array));  // throws unless it has a contiguous buffer

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterator
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -142,6 +143,14 @@ def test_elements_are_converted(client: mpf.Client) -> None:
             mpf.Int32Array(values)
     with pytest.raises(ValueError, match="one dimension"):
         mpf.Float64Array(np.zeros((2, 2)))
+
+
+def test_elements_that_are_no_real_numbers_are_refused() -> None:
+    for values in ([1j], np.array(["2026-11-30"], "M8[D]"), ["1"]):
+        for array in (mpf.Int32Array, mpf.Float64Array):
+            with pytest.raises(TypeError, match=f"{array.__name__}: .* must be real numbers, not"):
+                array(values)
+    assert mpf.Float64Array([Fraction(1, 2)]).value.tolist() == [0.5]
 
 
 def test_text_and_bytes(client: mpf.Client) -> None:

@@ -15,6 +15,7 @@ import pytest
 from conftest import PATIENCE
 
 import mpf
+from mpf import program
 
 
 def test_servers_and_their_counters(doubler: mpf.Server) -> None:
@@ -78,6 +79,18 @@ def test_a_recording_that_cannot_be_written_is_an_error(
 ) -> None:
     with pytest.raises(mpf.Error, match=reason):
         mpf.record("dac", tmp_path / file)
+
+
+def test_a_program_that_writes_nothing_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    silent = tmp_path / "mpf"
+    silent.write_text("#!/bin/sh\nexec sleep infinity\n")
+    silent.chmod(0o755)
+    monkeypatch.setattr(program, "find", lambda: str(silent))
+    monkeypatch.setattr(program, "_PATIENCE", 0.1)
+    with pytest.raises(mpf.Error, match="has written nothing within 0.1 s"):
+        mpf.record("doubler", str(tmp_path / "calls.mpf"))
 
 
 def test_a_recording_that_fails_is_an_error(doubler: mpf.Server, tmp_path: Path) -> None:

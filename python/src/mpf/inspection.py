@@ -70,7 +70,7 @@ class Running:
     def _await(self, stream: IO[str] | None, pattern: str) -> None:
         """Waits for the first line of its stdout or stderr, which matches unless it fails."""
         assert stream is not None
-        line = stream.readline()
+        line = program.first_line(self._process, stream)
         if not re.match(pattern, line):
             raise Error((line + program.error_of(self._process)).strip())
 

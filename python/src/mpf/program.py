@@ -5,12 +5,17 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
+from typing import IO
 
-_PATIENCE = 10.0  # [s] for a program to end by itself
+from mpf.errors import Error
+
+_PATIENCE = 10.0  # [s] for a program to write its first line, or to end by itself
 
 
 def find() -> str:
@@ -36,6 +41,21 @@ def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(
         command(arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
+
+
+def first_line(process: subprocess.Popen[str], stream: IO[str]) -> str:
+    """The first line of its stdout or stderr; empty if it ends before. Raises Error, and kills the
+    program, if it takes too long."""
+    limit = threading.Timer(_PATIENCE, process.kill)
+    limit.start()
+    try:
+        line = stream.readline()
+    finally:
+        limit.cancel()
+        limit.join()
+    if not line and process.wait() == -signal.SIGKILL:
+        raise Error(f"the program mpf has written nothing within {_PATIENCE:g} s")
+    return line
 
 
 def stop(process: subprocess.Popen[str]) -> None:
