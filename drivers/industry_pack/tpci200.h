@@ -12,8 +12,8 @@
 // cycle that no module answers reads ones.
 //
 // Threads  any number of callers at a time; accesses of one process to one board are serialised.
-//          The thread begins its work with the first enable() of an interrupt, and has the real-time
-//          priority of that interrupt where the process may set it.
+//          The thread begins its work with the first enable() of an interrupt. It has the
+//          real-time priority of that interrupt where the process may set it.
 // Crash    site() locks the site for this process, until the process ends, and masks its
 //          interrupts. The other processes on the board mask the lines of a site that has no
 //          process.

@@ -107,7 +107,8 @@ std::size_t lengthOf(const PyArray<T>& array) {
 template <class T>
 void checkNumbers(nb::handle elements) {
   const auto type = elements.attr("dtype");
-  constexpr std::string_view kNumbers = "biufO";  // `kind` of a dtype; numpy converts objects or fails
+  // Values of dtype.kind. Objects (O) are converted by numpy, which raises TypeError if it cannot.
+  constexpr std::string_view kNumbers = "biufO";
   if (kNumbers.find(nb::cast<std::string>(type.attr("kind"))) != std::string_view::npos) return;
   PyErr_Format(PyExc_TypeError, "%s: the elements must be real numbers, not %U", kClassName<T>,
                nb::object(type.attr("name")).ptr());
