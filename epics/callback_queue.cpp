@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "epics/callback_queue.h"
 
-#include <algorithm>
+#include <utility>
 
 namespace mpf {
 
@@ -11,19 +11,21 @@ CallbackQueue::CallbackQueue(int priority) {
   callbackSetPriority(priority, &callback_);
 }
 
-void CallbackQueue::add(Record& record) {
+void CallbackQueue::add(Record& record) noexcept {
   const std::lock_guard lock(mutex_);
-  waiting_.push_back(&record);
+  record.next_ = nullptr;
+  *end_ = &record;
+  end_ = &record.next_;
 }
 
 void CallbackQueue::flush() {
   const std::lock_guard lock(mutex_);
-  if (!isPending_ && !waiting_.empty()) isPending_ = callbackRequest(&callback_) == 0;
+  if (!isPending_ && first_ != nullptr) isPending_ = callbackRequest(&callback_) == 0;
 }
 
 void CallbackQueue::clear() {
   const std::lock_guard lock(mutex_);
-  waiting_.clear();
+  takeAll();
   isPending_ = false;
 }
 
@@ -34,18 +36,23 @@ void CallbackQueue::onCallback(epicsCallback* callback) {
 }
 
 void CallbackQueue::processAll() {
-  {
-    const std::lock_guard lock(mutex_);
-    taken_.swap(waiting_);
+  std::unique_lock lock(mutex_);
+  auto* next = takeAll();
+  lock.unlock();
+  while (next != nullptr) {
+    auto& record = *next;
+    next = record.next_;  // read first: a record that leaves the queue may be added at once
+    if (record.processOne()) add(record);
   }
-  std::erase_if(taken_, [](Record* record) { return !record->processOne(); });
-  {
-    const std::lock_guard lock(mutex_);
-    waiting_.insert(waiting_.end(), taken_.begin(), taken_.end());
-    taken_.clear();
-    isPending_ = false;
-  }
+  lock.lock();
+  isPending_ = false;
+  lock.unlock();
   flush();  // other callbacks of the IOC have their turn first
+}
+
+CallbackQueue::Record* CallbackQueue::takeAll() noexcept {
+  end_ = &first_;
+  return std::exchange(first_, nullptr);
 }
 
 }  // namespace mpf

@@ -9,7 +9,6 @@
 
 #include <callback.h>
 #include <mutex>
-#include <vector>
 
 namespace mpf {
 
@@ -21,7 +20,11 @@ class CallbackQueue {
     [[nodiscard]] virtual bool processOne() = 0;
 
    protected:
-    ~Record() = default;
+    virtual ~Record() = default;
+
+   private:
+    friend class CallbackQueue;
+    Record* next_ = nullptr;  // in the queue
   };
 
   //   priority   priorityLow, priorityMedium or priorityHigh
@@ -29,8 +32,8 @@ class CallbackQueue {
   CallbackQueue(const CallbackQueue&) = delete;
   CallbackQueue& operator=(const CallbackQueue&) = delete;
 
-  // The record is not in the queue, and it outlives its time there.
-  void add(Record& record);
+  // The record is not in the queue, and it outlives its time there. Needs no memory.
+  void add(Record& record) noexcept;
   // Requests the callback if records wait and it is not pending. The IOC may refuse it, because its
   // own queue is full: the next call tries again.
   void flush();
@@ -40,11 +43,12 @@ class CallbackQueue {
  private:
   static void onCallback(epicsCallback* callback);
   void processAll();
+  Record* takeAll() noexcept;
 
   std::mutex mutex_;
-  std::vector<Record*> waiting_;  // both under mutex_
+  Record* first_ = nullptr;  // all under mutex_
+  Record** end_ = &first_;  // where the next record is linked
   bool isPending_ = false;
-  std::vector<Record*> taken_;  // by the callback
   epicsCallback callback_{};
 };
 
