@@ -129,9 +129,7 @@ class RingProducer {
 
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
   // message and will probably send one. Any thread.
-  void expectPush() const noexcept {
-    lines::request(&next());
-  }
+  void expectPush() const noexcept { lines::request(&next()); }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
   // The same, for any thread. A message is counted before the consumer sees it.
