@@ -16,6 +16,7 @@
 
 #include "base/printable.h"
 #include "base/system_call.h"
+#include "crate/config/process_environment.h"
 
 namespace mpf::crate {
 namespace {
@@ -64,17 +65,6 @@ class Spawn {
   posix_spawn_file_actions_t actions_{};
   posix_spawnattr_t attributes_{};
 };
-
-std::vector<std::string> environmentOf(const ProcessPlan& plan) {
-  std::vector<std::string> variables;
-  for (char** one = environ; *one != nullptr; ++one) {
-    const std::string text = *one;
-    if (!plan.environment.contains(text.substr(0, text.find('=')))) variables.push_back(text);
-  }
-  for (const auto& [name, value] : plan.environment)
-    variables.push_back(fmt::format("{}={}", name, value));
-  return variables;
-}
 
 // Reads until the end of the file. Returns false at the deadline.
 bool readAll(int file, const Deadline& deadline, std::string& text) {

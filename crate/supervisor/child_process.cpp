@@ -21,6 +21,7 @@
 
 #include "base/process_stat.h"
 #include "base/system_call.h"
+#include "crate/config/process_environment.h"
 #include "shm/shortage.h"
 
 namespace mpf::crate {
@@ -41,7 +42,6 @@ struct User {
   std::string name;
   uid_t uid = static_cast<uid_t>(-1);
   gid_t gid = 0;
-  std::string home;
 };
 
 User userOf(const ProcessPlan& plan) {
@@ -51,7 +51,6 @@ User userOf(const ProcessPlan& plan) {
   const auto* const entry = ::getpwnam(user.name.c_str());  // NOLINT(concurrency-mt-unsafe)
   if (entry == nullptr) throw std::runtime_error(fmt::format("there is no user \"{}\"", user.name));
   user.gid = entry->pw_gid;
-  user.home = entry->pw_dir;
   if (entry->pw_uid != ::geteuid()) user.uid = entry->pw_uid;
   return user;
 }
@@ -59,20 +58,8 @@ User userOf(const ProcessPlan& plan) {
 // Everything that the child needs, prepared before the fork: it may call only functions that are
 // safe in a signal handler.
 struct Image {
-  Image(const ProcessPlan& plan, const User& user, const std::string& notifySocket)
-      : command(plan.command) {
-    auto values = plan.environment;  // those of the plan come first: insert() keeps them
-    if (!user.name.empty())
-      values.insert({{"HOME", user.home}, {"USER", user.name}, {"LOGNAME", user.name}});
-    for (char** one = environ; *one != nullptr; ++one) {
-      const std::string text = *one;
-      const auto name = text.substr(0, text.find('='));
-      if (name != "NOTIFY_SOCKET" && name != "WATCHDOG_USEC" && name != "WATCHDOG_PID" &&
-          !values.contains(name))
-        environment.push_back(text);
-    }
-    for (const auto& [name, value] : values)
-      environment.push_back(fmt::format("{}={}", name, value));
+  Image(const ProcessPlan& plan, const std::string& notifySocket)
+      : command(plan.command), environment(environmentOf(plan)) {
     if (plan.notifies) environment.push_back("NOTIFY_SOCKET=" + notifySocket);
     for (auto& word : command) arguments.push_back(word.data());
     for (auto& one : environment) variables.push_back(one.data());
@@ -117,7 +104,7 @@ ChildProcess::ChildProcess(const ProcessPlan& plan, const std::string& log,
   const FileDescriptor logFile(
       checkCall(::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600), "open", log));
   const auto user = userOf(plan);
-  const Image image(plan, user, notifySocket);
+  const Image image(plan, notifySocket);
   const auto folder = plan.workingFolder.empty() ? std::string(".") : plan.workingFolder;
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): after what it needs
   pid_ = checkCall(::fork(), "fork");

@@ -9,8 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <optional>
-#include <pwd.h>
-#include <string>
 
 #include <mpf/clock.h>
 
@@ -53,21 +51,6 @@ TEST_F(ChildProcessTest, RunsInItsFolderWithItsEnvironment) {
   EXPECT_EQ(WEXITSTATUS(wait(child.pid())), 3);
   EXPECT_EQ(readWholeFile(log_),
             std::filesystem::canonical(folder_.path()).string() + "\nvalue of A\nerror\n");
-}
-
-TEST_F(ChildProcessTest, HasTheVariablesOfItsUser) {
-  const auto* const user = ::geteuid() == 0 ? ::getpwnam("nobody") : ::getpwuid(::geteuid());
-  ASSERT_NE(user, nullptr);
-  auto plan = planOf("echo $HOME $USER $LOGNAME");
-  plan.workingFolder = "/";
-  plan.user = user->pw_name;
-  plan.environment["LOGNAME"] = "given";
-  ChildProcess child(plan, log_);
-
-  EXPECT_EQ(child.open(), "");
-
-  wait(child.pid());
-  EXPECT_EQ(readWholeFile(log_), std::string(user->pw_dir) + " " + user->pw_name + " given\n");
 }
 
 TEST_F(ChildProcessTest, DoesNotRunIfTheSupervisorEndsFirst) {
