@@ -103,15 +103,23 @@ std::size_t lengthOf(const PyArray<T>& array) {
 }
 
 // Raises TypeError unless the elements are real numbers. Numpy would convert others, too: it drops
-// the imaginary parts of complex numbers, and counts the days of dates.
+// imaginary parts, counts the days of dates, reads texts, and makes NaN of None.
+//   elements  an array of numpy
 template <class T>
 void checkNumbers(nb::handle elements) {
   const auto type = elements.attr("dtype");
-  // Values of dtype.kind. Objects (O) are converted by numpy, which raises TypeError if it cannot.
-  constexpr std::string_view kNumbers = "biufO";
-  if (kNumbers.find(nb::cast<std::string>(type.attr("kind"))) != std::string_view::npos) return;
+  const auto kind = nb::cast<std::string>(type.attr("kind"));
+  nb::object wrong;  // name of a type
+  if (kind == "O") {  // Python objects, such as Fraction
+    const auto real = nb::module_::import_("numbers").attr("Real");
+    for (const auto& one : nb::iter(elements))
+      if (!nb::isinstance(one, real)) wrong = one.type().attr("__name__");
+  } else if (std::string_view("biuf").find(kind) == std::string_view::npos) {
+    wrong = type.attr("name");
+  }
+  if (!wrong.is_valid()) return;
   PyErr_Format(PyExc_TypeError, "%s: the elements must be real numbers, not %U", kClassName<T>,
-               nb::object(type.attr("name")).ptr());
+               wrong.ptr());
   throw nb::python_error();
 }
 
@@ -125,8 +133,9 @@ void setValues(PyArray<T>& array, nb::handle value) {
     if (dimensions == 0) raiseWrongType({kClassName<T>, "value"}, "an array", value);
     if (dimensions != 1) throw nb::value_error("the elements must have one dimension");
     checkNumbers<T>(given);
-    array.values = numpy(Numpy::asArray)(given, numpy(kElementType<T>), "C");
-    if (std::is_same_v<T, Int32Array> && !array.values.is(given) &&
+    // From the value itself: numpy reports numbers of a list that do not fit, and wraps others.
+    array.values = numpy(Numpy::asArray)(value, numpy(kElementType<T>), "C");
+    if (std::is_same_v<T, Int32Array> && !array.values.is(value) &&
         !nb::cast<bool>(numpy(Numpy::arrayEqual)(array.values, given)))
       throw nb::value_error("the elements are not 32-bit integers");
   } else {

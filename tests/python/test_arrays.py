@@ -146,11 +146,13 @@ def test_elements_are_converted(client: mpf.Client) -> None:
 
 
 def test_elements_that_are_no_real_numbers_are_refused() -> None:
-    for values in ([1j], np.array(["2026-11-30"], "M8[D]"), ["1"]):
+    date = np.datetime64("2026-11-30")
+    for values in ([1j], [date], ["1"], [1, None], [Fraction(1), 1j], np.array(["1"], object)):
         for array in (mpf.Int32Array, mpf.Float64Array):
             with pytest.raises(TypeError, match=f"{array.__name__}: .* must be real numbers, not"):
                 array(values)
-    assert mpf.Float64Array([Fraction(1, 2)]).value.tolist() == [0.5]
+    assert mpf.Float64Array([Fraction(1, 2), True, np.float32(2)]).value.tolist() == [0.5, 1.0, 2.0]
+    assert mpf.Int32Array([]).value.tolist() == []
 
 
 def test_text_and_bytes(client: mpf.Client) -> None:

@@ -15,7 +15,7 @@ import pytest
 from conftest import PATIENCE
 
 import mpf
-from mpf import program
+from mpf import inspection, program
 
 
 def test_servers_and_their_counters(doubler: mpf.Server) -> None:
@@ -88,9 +88,11 @@ def test_a_program_that_writes_nothing_is_an_error(
     silent.write_text("#!/bin/sh\nexec sleep infinity\n")
     silent.chmod(0o755)
     monkeypatch.setattr(program, "find", lambda: str(silent))
-    monkeypatch.setattr(program, "_PATIENCE", 0.1)
+    monkeypatch.setattr(inspection, "_PATIENCE", 0.1)
     with pytest.raises(mpf.Error, match="has written nothing within 0.1 s"):
         mpf.record("doubler", str(tmp_path / "calls.mpf"))
+    with pytest.raises(mpf.Error, match="has written nothing within 0.2 s"):
+        mpf.replay(str(tmp_path / "calls.mpf"), timeout=0.2)
 
 
 def test_a_recording_that_fails_is_an_error(doubler: mpf.Server, tmp_path: Path) -> None:

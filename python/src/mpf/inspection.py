@@ -15,6 +15,8 @@ from typing import IO, Any, TypeVar
 from mpf import program
 from mpf.errors import Error
 
+_PATIENCE = 10.0  # [s] for a recording to begin
+
 Self = TypeVar("Self")
 
 
@@ -67,10 +69,10 @@ class Running:
         if self._process.returncode not in (0, -signal.SIGTERM):
             raise Error(program.error_of(self._process))
 
-    def _await(self, stream: IO[str] | None, pattern: str) -> None:
+    def _await(self, stream: IO[str] | None, pattern: str, patience: float) -> None:
         """Waits for the first line of its stdout or stderr, which matches unless it fails."""
         assert stream is not None
-        line = program.first_line(self._process, stream)
+        line = program.first_line(self._process, stream, patience)
         if not re.match(pattern, line):
             raise Error((line + program.error_of(self._process)).strip())
 
@@ -134,11 +136,13 @@ def record(
         with mpf.record("dac", "calls.mpf"):
             ...
 
-    The same as `mpf tap --write`. Raises Error if the file cannot be written.
+    The same as `mpf tap --write`. Raises Error if the file cannot be written, or if the recording
+    has not begun within 10 s.
     """
     options = ["--write", os.fspath(file), *_backplane(backplane), *_at(location)]
     recording = Recording(["tap", server, "0", *options])
-    recording._await(recording._process.stderr, r"mpf tap: .*( now|; waiting for it)$")
+    pattern = r"mpf tap: .*( now|; waiting for it)$"
+    recording._await(recording._process.stderr, pattern, _PATIENCE)
     return recording
 
 
@@ -162,6 +166,7 @@ def replay(
     *,
     location: int | None = None,
     speed: float = 1.0,
+    timeout: float = 60.0,
 ) -> Ghost:
     """Starts a server that replies to its clients as in a recording, with the same delays:
 
@@ -172,13 +177,15 @@ def replay(
 
     server: its name; by default that of the recording.
     speed: 2 halves the delays, 0 leaves them out.
+    timeout: [s] to read the recording in.
 
-    Raises Error if the recording is damaged or if another process serves this name.
+    Raises Error if the recording is damaged, if it takes longer to read, or if another process
+    serves this name.
     """
     options = ["--server", server] if server else []
     options += ["--speed", str(speed), "--json", *_backplane(backplane), *_at(location)]
     ghost = Ghost(["replay", os.fspath(file), "--as-server", *options])
-    ghost._await(ghost._process.stdout, r"\{")
+    ghost._await(ghost._process.stdout, r"\{", timeout)
     return ghost
 
 

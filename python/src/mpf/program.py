@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -15,7 +14,7 @@ from typing import IO
 
 from mpf.errors import Error
 
-_PATIENCE = 10.0  # [s] for a program to write its first line, or to end by itself
+_PATIENCE = 10.0  # [s] for a program to end by itself
 
 
 def find() -> str:
@@ -43,18 +42,27 @@ def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
     )
 
 
-def first_line(process: subprocess.Popen[str], stream: IO[str]) -> str:
-    """The first line of its stdout or stderr; empty if it ends before. Raises Error, and kills the
-    program, if it takes too long."""
-    limit = threading.Timer(_PATIENCE, process.kill)
+def first_line(process: subprocess.Popen[str], stream: IO[str], patience: float) -> str:
+    """The first line of its stdout or stderr; empty if it ends before.
+
+    Kills the program, and raises Error, if it takes longer than `patience` [s].
+    """
+    late = threading.Event()
+
+    def give_up() -> None:
+        late.set()
+        process.kill()
+
+    limit = threading.Timer(patience, give_up)
     limit.start()
     try:
         line = stream.readline()
     finally:
         limit.cancel()
         limit.join()
-    if not line and process.wait() == -signal.SIGKILL:
-        raise Error(f"the program mpf has written nothing within {_PATIENCE:g} s")
+    if late.is_set():
+        text = f"the program mpf has written nothing within {patience:g} s"
+        raise Error("\n".join([text, error_of(process)]).strip())
     return line
 
 
