@@ -112,8 +112,11 @@ void checkNumbers(nb::handle elements) {
   nb::object wrong;  // name of a type
   if (kind == "O") {  // Python objects, such as Fraction
     const auto real = nb::module_::import_("numbers").attr("Real");
-    for (const auto& one : nb::iter(elements))
-      if (!nb::isinstance(one, real)) wrong = one.type().attr("__name__");
+    for (const auto& one : nb::iter(elements)) {
+      if (nb::isinstance(one, real)) continue;
+      wrong = one.type().attr("__name__");
+      break;
+    }
   } else if (std::string_view("biuf").find(kind) == std::string_view::npos) {
     wrong = type.attr("name");
   }
@@ -133,9 +136,10 @@ void setValues(PyArray<T>& array, nb::handle value) {
     if (dimensions == 0) raiseWrongType({kClassName<T>, "value"}, "an array", value);
     if (dimensions != 1) throw nb::value_error("the elements must have one dimension");
     checkNumbers<T>(given);
-    // From the value itself: numpy reports numbers of a list that do not fit, and wraps others.
-    array.values = numpy(Numpy::asArray)(value, numpy(kElementType<T>), "C");
-    if (std::is_same_v<T, Int32Array> && !array.values.is(value) &&
+    // Of a list, numpy reports integers that do not fit; of an array, it would wrap them.
+    const nb::handle source = std::is_same_v<T, Int32Array> ? value : nb::handle(given);
+    array.values = numpy(Numpy::asArray)(source, numpy(kElementType<T>), "C");
+    if (std::is_same_v<T, Int32Array> && !array.values.is(given) &&
         !nb::cast<bool>(numpy(Numpy::arrayEqual)(array.values, given)))
       throw nb::value_error("the elements are not 32-bit integers");
   } else {
