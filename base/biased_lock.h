@@ -31,6 +31,14 @@ class BiasedLock {
     const bool isInside_;  // has entered by the bias
   };
 
+  // Calls `action` under the lock if the bias is enabled for this thread, which does not hold it.
+  template <class Action>
+  [[gnu::always_inline]] void ifBiased(const Action& action) noexcept {
+    if (!bias_.tryEnter()) return;
+    action();
+    bias_.leave();
+  }
+
  private:
   // Not inline, so that Guard is.
   [[gnu::noinline]] void lockReal() noexcept {

@@ -130,6 +130,11 @@ class RingProducer {
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
   // message and will probably send one. Any thread.
   void expectPush() const noexcept { lines::request(&next()); }
+  // The same, also on a processor that does not request a line which the consumer polls. Claims the
+  // line, if messages are sent one by one. The thread that pushes.
+  void claimNext() noexcept {
+    if (step_ == 0 && pushed_ < freeEnd_) lines::claim(next().type);
+  }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
   // The same, for any thread. A message is counted before the consumer sees it.
@@ -159,7 +164,7 @@ class RingProducer {
  private:
   // Steps: after so many slots, lines are fetched and the consumer is looked at. None are fetched
   // for round trips one by one: the consumer polls the next slot and takes its line back at once.
-  // There, expectPush() requests the next line.
+  // There, expectPush() and claimNext() fetch the next line.
   //   near     the consumer may be about to read a slot that waits for the transfers of these lines
   //   stream   the consumer keeps a distance
   static constexpr std::uint64_t kStepNear = 8, kStepInStream = 16;
@@ -199,10 +204,11 @@ class RingProducer {
     return true;
   }
   // Fetches the lines of free slots, so that their transfers from the consumer's processor overlap;
-  // those of messages do not, because the stores of one message fill the store buffer. In a stream,
-  // each line is requested up to three times, early enough to arrive while other slots are filled.
-  // Near the consumer, that would take lines from it that it still reads; there, the next lines are
-  // claimed. If step_ is 0, only looks where the consumer polls.
+  // those of messages do not, because the stores of one message fill the store buffer. Claims the
+  // next lines. In a stream, requests further ones, each up to three times: on a processor where
+  // requests have an effect, these lines arrive while other slots are filled, and later claims need
+  // not wait for them. Near the consumer, requests would take lines from it that it still reads. If
+  // step_ is 0, only looks where the consumer polls.
   [[gnu::noinline]] void fetchLines() noexcept {
     const auto polledOn = polledOn_ != nullptr ? polledOn_->load(std::memory_order_relaxed) : 0;
     const auto here = lines::thisProcessor();
@@ -210,11 +216,9 @@ class RingProducer {
     stepEnd_ = std::min(freeEnd_, pushed_ + (step_ == 0 ? kLookEvery : step_));
     if (step_ == 0) return;
     if (stepEnd_ == freeEnd_) __builtin_prefetch(&consumer_.freed);  // hasFreed() looks at it soon
-    if (step_ == kStepNear) {
-      for (auto position = pushed_; position < stepEnd_; ++position)
-        lines::claim(slot(position).type);
-      return;
-    }
+    for (auto position = pushed_; position < stepEnd_; ++position)
+      lines::claim(slot(position).type);
+    if (step_ == kStepNear) return;
     const auto end = std::min(freeEnd_, stepEnd_ + kRequestedInStream);
     for (auto position = stepEnd_; position < end; ++position) lines::request(&slot(position));
   }

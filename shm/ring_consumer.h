@@ -153,6 +153,8 @@ class RingConsumer {
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
+  // Whether onEmpty() was called before the last message that was begun.
+  [[nodiscard]] bool wasIdle() const noexcept { return messages_ == messagesBeforeIdle_ + 1; }
   // How often onEmpty() was called after further messages. Any thread.
   [[nodiscard]] std::uint64_t timesIdle() const noexcept {
     return timesIdle_.load(std::memory_order_relaxed);

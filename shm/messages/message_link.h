@@ -35,6 +35,7 @@ class MessageLink final : public BodyLender {
   // Returns false if the envelope is invalid.
   [[nodiscard]] bool tryBegin(Envelope& envelope) noexcept {
     envelope = link_->incoming().begin();
+    if (link_->incoming().wasIdle()) claimNextLine();
     const bool fitsSlot = link_->incoming().hasOneSlot() && isShort(envelope.body());
     return (fitsSlot && hasType(envelope.body())) || isValidLong(envelope.body());
   }
@@ -90,6 +91,10 @@ class MessageLink final : public BodyLender {
   MessageLink(std::unique_ptr<Link> link, std::shared_ptr<BiasedLock> lock)
       : link_(std::move(link)), lock_(std::move(lock)) {}
   ~MessageLink() = default;
+  // Fetches the line of the next message that is sent, while the one begun is handled.
+  [[gnu::always_inline]] void claimNextLine() noexcept {
+    lock_->ifBiased([this] { link_->outgoing().claimNext(); });
+  }
   // The last pointer is gone.
   void leave() noexcept;
   [[nodiscard]] static bool hasType(BodyFields body) noexcept {

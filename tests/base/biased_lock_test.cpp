@@ -17,6 +17,20 @@ namespace {
 constexpr int kManyEntries = 100'000;
 constexpr int kSomeYields = 10;
 
+// The bias is enabled for the calling thread.
+void becomeOwner(BiasedLock& lock) {
+  for (int i = 0; i < kManyEntries; ++i) {
+    const BiasedLock::Guard guard(lock);
+  }
+}
+
+// Whether ifBiased() calls its action.
+bool isBiased(BiasedLock& lock) {
+  bool isCalled = false;
+  lock.ifBiased([&] { isCalled = true; });
+  return isCalled;
+}
+
 // Threads take turns at being the only user, and then all use the lock at once.
 TEST(BiasedLockTest, AdmitsOneThreadAtATime) {
   BiasedLock lock;
@@ -41,9 +55,7 @@ TEST(BiasedLockTest, AdmitsOneThreadAtATime) {
 // The owner of the bias holds the lock without a locked instruction; another thread waits for it.
 TEST(BiasedLockTest, AnotherThreadWaitsForTheOwner) {
   BiasedLock lock;
-  for (int i = 0; i < kManyEntries; ++i) {
-    const BiasedLock::Guard guard(lock);
-  }
+  becomeOwner(lock);
   bool isHeld = true;
   std::atomic<int> yields{0};  // of the other thread
   std::atomic<bool> hasEntered{false};
@@ -67,6 +79,40 @@ TEST(BiasedLockTest, AnotherThreadWaitsForTheOwner) {
   }
   other.join();
   EXPECT_TRUE(hasEntered);
+}
+
+TEST(BiasedLockTest, ActsUnderTheBiasOnlyInTheThreadThatHasIt) {
+  BiasedLock lock;
+  EXPECT_FALSE(isBiased(lock)) << "before the first entry";
+  becomeOwner(lock);
+
+  std::thread([&] { EXPECT_FALSE(isBiased(lock)) << "in another thread"; }).join();
+
+  EXPECT_TRUE(isBiased(lock)) << "the other thread has not disabled the bias";
+  std::thread([&] { const BiasedLock::Guard guard(lock); }).join();
+  EXPECT_FALSE(isBiased(lock)) << "the other thread has disabled the bias";
+}
+
+// The other thread enters by the real lock while the owner may be in its action.
+TEST(BiasedLockTest, AnActionUnderTheBiasHoldsTheLock) {
+  BiasedLock lock;
+  becomeOwner(lock);
+  int count = 0;  // not atomic: the lock protects it
+  int actions = 0;
+  std::thread other([&] {
+    for (int i = 0; i < kManyEntries; ++i) {
+      const BiasedLock::Guard guard(lock);
+      ++count;
+    }
+  });
+  for (int i = 0; i < kManyEntries; ++i)
+    lock.ifBiased([&] {
+      ++count;
+      ++actions;
+    });
+  other.join();
+
+  EXPECT_EQ(count, kManyEntries + actions);
 }
 
 }  // namespace

@@ -33,21 +33,43 @@ TEST_F(RingTest, CountsHowOftenItsOwnerWasIdleAfterMessages) {
   EXPECT_EQ(consumer_.timesIdle(), 1u);
 }
 
+constexpr std::uint16_t kType = 7;
+
+bool tryPushTyped(RingProducer& producer) {
+  return producer.tryPushShort([] { return Envelope{.type = kType}; }, 0, {}, 0);
+}
+
 TEST_F(RingTest, AClaimOfLinesKeepsTheMessagesThatWait) {
-  constexpr std::uint16_t kType = 7;
-  const auto tryPush = [&] {
-    return producer_.tryPushShort([] { return Envelope{.type = kType}; }, 0, {}, 0);
-  };
-  for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(tryPush());
+  for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(tryPushTyped(producer_));
   for (int i = 0; i < 2; ++i) take();
 
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(tryPush());  // the first one claims both lines
+  // The first one claims both lines.
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(tryPushTyped(producer_));
 
   for (std::uint32_t i = 0; i < kCapacity; ++i) {
     ASSERT_TRUE(consumer_.hasMessage());
     EXPECT_EQ(consumer_.begin().type, kType);
     consumer_.end();
   }
+}
+
+TEST_F(RingTest, AClaimOfTheNextLineOfAFullRingKeepsTheMessageThere) {
+  for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(tryPushTyped(producer_));
+
+  producer_.claimNext();
+
+  ASSERT_TRUE(consumer_.hasMessage());
+  EXPECT_EQ(consumer_.begin().type, kType);
+}
+
+TEST_F(RingTest, KnowsWhetherTheOwnerWasIdleBeforeTheMessage) {
+  for (const auto ordinal : {1u, 2u}) ASSERT_TRUE(push(ordinal));
+  consumer_.onEmpty();
+
+  take();
+  EXPECT_TRUE(consumer_.wasIdle());
+  take();
+  EXPECT_FALSE(consumer_.wasIdle());
 }
 
 TEST_F(RingTest, TheProducerLooksWhereItsConsumerPolls) {
