@@ -4,8 +4,8 @@
 //
 // A line that another processor has read must come back before a write to it takes effect.
 // prefetchw fetches it without waiting (Intel processors before Broadwell ignore it). On an AMD
-// processor (Zen 3) this takes longer than a message: the lines of the next messages of a stream
-// come in time only if they are requested far ahead, or written to.
+// processor this takes longer than a message (Zen 3), or has hardly any effect on a line that is in
+// the cache of another processor (Zen 4): there, only a write fetches it in time.
 //
 // Threads  request(), offer(): any; claim(): the thread that may write the field.
 #pragma once
