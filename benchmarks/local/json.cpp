@@ -65,6 +65,7 @@ Json toObject(const Result& result, const Machine& machine, const Placement& pla
     object["disturbed_percent"] = 100 * result.disturbance.share();
     object["preemptions"] = result.disturbance.preemptions;
   }
+  if (result.rounds > 0) object["rounds"] = result.rounds;
   if (result.floorDrift > 0) object["floor_drift"] = result.floorDrift;
   auto cpus = placement.server;
   cpus.insert(cpus.end(), placement.requester.begin(), placement.requester.end());

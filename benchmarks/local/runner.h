@@ -2,13 +2,13 @@
 // Runner: measures the rows of a block in rounds, and compares all of them with the same floor.
 //
 //   floor, row 1, row 2 ... row n, floor;  floor, row 1 ... row n, floor;  ...
-//   ratio of a row = median of its ratios in all rounds, each to the floor of that round
+//   ratio of a row = median of its ratios in the rounds that count, each to the floor of that round
 //
-// A host may move the processors of a virtual machine at any time, and a cache line then needs
-// 70 ns or 500 ns between the same two CPUs. A floor that was measured a minute ago cannot be
-// compared, and so every round measures its floors again; two rows with different measurements of a
-// floor cannot be compared with each other, and so the rows of a round share them. The floors are
-// measured once more after a round of several rows: if they have moved meanwhile, its rows say so.
+// A floor that was measured a minute ago cannot be compared, because the host may have moved the
+// processors (local/rounds.h), and so every round measures its floors again; two rows with
+// different measurements of a floor cannot be compared with each other, and so the rows of a round
+// share them. The floors are measured once more after a round of several rows. Rounds are repeated
+// until enough of them agree, or kMostTimes as many as planned were measured.
 //
 // Threads  the runner's only one.
 #pragma once
@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "benchmarks/local/rounds.h"
 #include "benchmarks/stage/measurement.h"
 
 namespace mpf::bench {
@@ -27,11 +28,13 @@ namespace mpf::bench {
 struct PlannedRow {
   Measurement row;
   Budget budget;
-  int rounds = 1;  // at least 1
+  int rounds = 1;  // that agree; at least 1
 };
 
 class Runner {
  public:
+  static constexpr int kMostTimes = 2;
+
   // `all` must outlive the runner; it contains the floors.
   Runner(Placement placement, const std::vector<Measurement>& all) noexcept
       : placement_(std::move(placement)), all_(all) {}
@@ -46,10 +49,11 @@ class Runner {
     Budget budget;
     double beforeNs = 0;
     double afterNs = 0;
-    [[nodiscard]] double drift() const noexcept;
   };
   // By setting, name and bytes.
   using Floors = std::map<std::tuple<std::string, std::string, std::size_t>, Floor>;
+  bool measureRound(const std::vector<PlannedRow>& block, int round, std::vector<Result>& results,
+                    std::vector<Rounds>& rounds);
   [[nodiscard]] std::string enter(const Measurement& row);
   // The floor of a row, which is measured the first time in a round.
   [[nodiscard]] const Floor& floorOf(const Measurement& row, Budget budget, Floors& floors);

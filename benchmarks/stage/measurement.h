@@ -41,12 +41,13 @@ struct Result {
   Measurement measurement;
   Figures figures;
   std::string error;
+  std::size_t rounds = 0;   // that count: see local/rounds.h
   double floorNs = 0;       // a message of the floor, measured in the rounds of the row
   double ratioToFloor = 0;  // above 1: slower than the floor; 0: the row has no floor
   // The floor after a round divided by that before it, or the inverse if that is larger: median of
   // the rounds. 0: the row has no floor.
   double floorDrift = 0;
-  Disturbance disturbance;  // of all rounds together
+  Disturbance disturbance;  // of the rounds together
 
   [[nodiscard]] bool isGood() const noexcept {
     return measurement.skipped.empty() && error.empty();

@@ -29,8 +29,8 @@ Result runAlone(Runner& runner, const Measurement& row, int rounds) {
 }
 
 TEST(Runner, DividesEachRoundByTheFloorOfThatRound) {
-  const std::vector<Measurement> rows{costing("floor", {70, 500, 70})};
-  auto row = costing("ours", {84, 600, 7000});  // near, far, and disturbed
+  const std::vector<Measurement> rows{costing("floor", {70, 80, 75})};
+  auto row = costing("ours", {84, 96, 7000});  // the last one is disturbed
   row.floorName = "floor";
 
   Runner runner({}, rows);
@@ -38,15 +38,47 @@ TEST(Runner, DividesEachRoundByTheFloorOfThatRound) {
   const auto result = runAlone(runner, row, 3);
 
   EXPECT_DOUBLE_EQ(result.ratioToFloor, 1.2);
-  EXPECT_DOUBLE_EQ(result.floorNs, 70);
-  EXPECT_DOUBLE_EQ(result.costNs(), 600);
+  EXPECT_DOUBLE_EQ(result.floorNs, 75);
+  EXPECT_DOUBLE_EQ(result.costNs(), 96);
+}
+
+// How often a row is measured whose floor has these values before and after the rounds.
+int timesMeasured(const std::vector<double>& floorNs, Result& result) {
+  const std::vector<Measurement> rows{costing("floor", floorNs)};
+  int times = 0;
+  auto row = over("floor", costing("ours", {150}));
+  row.run = [&times, run = row.run](const Stage& stage) {
+    ++times;
+    return run(stage);
+  };
+  result = Runner({}, rows).run({{row, {}, 3}, {costing("other", {1}), {}, 1}}).front();
+  return times;
+}
+
+TEST(Runner, RepeatsRoundsUntilEnoughAgree) {
+  Result result;
+  const auto times =
+      timesMeasured({100, 100, 100, 400, 400, 400, 100, 100, 100, 100, 100, 100}, result);
+
+  EXPECT_EQ(times, 5) << "the floor moved in the second round, and had moved in the third one";
+  EXPECT_EQ(result.rounds, 3u);
+  EXPECT_DOUBLE_EQ(result.ratioToFloor, 1.5);
+}
+
+TEST(Runner, EndsWhenTheFloorMovesInEachRound) {
+  Result result;
+  const auto times = timesMeasured({100, 400}, result);
+
+  EXPECT_EQ(times, 3 * Runner::kMostTimes);
+  EXPECT_TRUE(result.hasFloorMoved());
+  EXPECT_EQ(result.rounds, static_cast<std::size_t>(times));
 }
 
 // The floor is measured before and after each round, and never between two rows.
 TEST(Runner, ComparesTheRowsOfARoundWithOneFloor) {
-  const std::vector<Measurement> rows{costing("floor", {100, 100, 200, 200, 400, 400})};
-  const auto ours = over("floor", costing("ours", {150, 300, 600}));
-  const auto theirs = over("floor", costing("theirs", {200, 400, 800}));
+  const std::vector<Measurement> rows{costing("floor", {100, 100, 110, 110, 120, 120})};
+  const auto ours = over("floor", costing("ours", {150, 165, 180}));
+  const auto theirs = over("floor", costing("theirs", {200, 220, 240}));
   const auto slow = over("floor", costing("slow", {1000}));
 
   const auto results = Runner({}, rows).run({{ours, {}, 3}, {theirs, {}, 3}, {slow, {}, 1}});
