@@ -67,6 +67,7 @@ Json toObject(const Result& result, const Machine& machine, const Placement& pla
   }
   if (result.rounds > 0) object["rounds"] = result.rounds;
   if (result.floorDrift > 0) object["floor_drift"] = result.floorDrift;
+  if (result.lineDrift > 0) object["line_drift"] = result.lineDrift;
   auto cpus = placement.server;
   cpus.insert(cpus.end(), placement.requester.begin(), placement.requester.end());
   object["cpus"] = cpus;

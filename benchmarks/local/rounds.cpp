@@ -2,6 +2,7 @@
 #include "benchmarks/local/rounds.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 
 namespace mpf::bench {
@@ -23,7 +24,7 @@ double medianOf(const std::vector<Round>& rounds, const Value& value) {
 }
 
 Figures combined(const std::vector<Round>& rounds) {
-  const auto median = [&](double Figures::*figure) {
+  const auto median = [&](double Figures::* figure) {
     return medianOf(rounds, [&](const Round& round) { return round.figures.*figure; });
   };
   Figures figures;
@@ -43,7 +44,17 @@ Figures combined(const std::vector<Round>& rounds) {
 
 }  // namespace
 
-double Round::drift() const noexcept {
+void LineTimes::add(double ns) noexcept {
+  if (ns > 0) add(LineTimes{ns, ns});
+}
+
+void LineTimes::add(const LineTimes& other) noexcept {
+  if (other.lowestNs <= 0) return;
+  lowestNs = lowestNs > 0 ? std::min(lowestNs, other.lowestNs) : other.lowestNs;
+  highestNs = std::max(highestNs, other.highestNs);
+}
+
+double Round::floorDrift() const noexcept {
   if (floorBeforeNs <= 0 || floorAfterNs <= 0) return 0;
   return std::max(floorBeforeNs, floorAfterNs) / std::min(floorBeforeNs, floorAfterNs);
 }
@@ -51,11 +62,12 @@ double Round::drift() const noexcept {
 std::vector<Round> Rounds::agreeingRounds() const {
   std::vector<Round> calm;
   std::ranges::copy_if(rounds_, std::back_inserter(calm), &Round::isCalm);
-  std::ranges::sort(calm, {}, &Round::floorBeforeNs);
+  const auto lowest = [](const Round& round) { return round.lines.lowestNs; };
+  std::ranges::sort(calm, {}, lowest);
   auto best = std::ranges::subrange(calm.begin(), calm.begin());
   for (auto begin = calm.begin(); begin != calm.end(); ++begin) {
     const auto end = std::find_if(begin, calm.end(), [&](const Round& round) {
-      return round.floorBeforeNs > begin->floorBeforeNs * Result::kLargeDrift;
+      return lowest(round) > lowest(*begin) * Result::kLargeLineDrift;
     });
     if (end - begin > std::ssize(best)) best = {begin, end};
   }
@@ -69,12 +81,12 @@ void Rounds::writeTo(Result& result) const {
   result.figures = combined(rounds);
   for (const auto& round : rounds) result.disturbance.add(round.disturbance);
   result.rounds = rounds.size();
-  result.floorDrift = medianOf(rounds, [](const Round& round) { return round.drift(); });
+  result.floorDrift = medianOf(rounds, std::mem_fn(&Round::floorDrift));
+  result.lineDrift = medianOf(rounds, [](const Round& round) { return round.lines.drift(); });
   if (result.measurement.floorName.empty() || rounds.front().floorBeforeNs <= 0) return;
   result.floorNs = medianOf(rounds, [](const Round& round) { return round.floorBeforeNs; });
-  result.ratioToFloor = medianOf(rounds, [](const Round& round) {
-    return costNs(round.figures) / round.floorBeforeNs;
-  });
+  result.ratioToFloor = medianOf(
+      rounds, [](const Round& round) { return costNs(round.figures) / round.floorBeforeNs; });
 }
 
 }  // namespace mpf::bench

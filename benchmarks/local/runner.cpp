@@ -2,10 +2,13 @@
 #include "benchmarks/local/runner.h"
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
 
 namespace mpf::bench {
 namespace {
+
+constexpr std::chrono::milliseconds kWarmLine{2}, kTimeLine{10};
 
 // Whether a row is measured in this round, the first of which is 0.
 bool isDue(const PlannedRow& row, const Rounds& results, int round) {
@@ -32,17 +35,24 @@ bool Runner::measureRound(const std::vector<PlannedRow>& block, int round,
                           std::vector<Result>& results, std::vector<Rounds>& rounds) {
   Floors floors;
   std::map<std::size_t, const Floor*> compared;  // by index of a row of this round
+  double lineNs = 0;
   for (std::size_t i = 0; i < block.size(); ++i) {
     auto& result = results[i];
     auto& row = result.measurement;
     if (!result.isGood() || !isDue(block[i], rounds[i], round)) continue;
     row.skipped = enter(row);
     if (!row.skipped.empty()) continue;
-    const auto& floor = floorOf(row, block[i].budget, floors);
+    if (compared.empty()) lineNs = timeLine();
+    const auto& floor = floorOf(row, block[i].budget, floors, lineNs);
     compared[i] = &floor;
+    auto lines = floor.lines;
+    lines.add(lineNs);
     const DisturbanceMeter meter(placement_);
     auto outcome = row.run(Stage(placement_, block[i].budget));
-    rounds[i].add({std::move(outcome.figures), meter.read(), floor.beforeNs});
+    const auto disturbance = meter.read();
+    lineNs = timeLine();
+    lines.add(lineNs);
+    rounds[i].add({std::move(outcome.figures), disturbance, lines, floor.beforeNs});
     result.error = std::move(outcome.error);
   }
   if (block.size() == 1) return !compared.empty();
@@ -66,7 +76,8 @@ std::string Runner::enter(const Measurement& row) try {
   return missing_[row.environmentName] = exception.what();
 }
 
-const Runner::Floor& Runner::floorOf(const Measurement& row, Budget budget, Floors& floors) {
+const Runner::Floor& Runner::floorOf(const Measurement& row, Budget budget, Floors& floors,
+                                     double& lineNs) {
   const auto [known, isNew] = floors.try_emplace({row.setting, row.floorName, row.floorBytes});
   auto& floor = known->second;
   if (!isNew || row.floorName.empty()) return floor;
@@ -76,8 +87,16 @@ const Runner::Floor& Runner::floorOf(const Measurement& row, Budget budget, Floo
   });
   if (found != all_.end()) floor.row = &*found;
   floor.budget = {budget.warmUp / 2, budget.measure / 2};
+  floor.lines.add(lineNs);
   floor.beforeNs = measure(floor);
+  lineNs = timeLine();
+  floor.lines.add(lineNs);
   return floor;
+}
+
+double Runner::timeLine() const {
+  if (line_ == nullptr) return 0;
+  return costNs(line_->run(Stage(placement_, {kWarmLine, kTimeLine})).figures);
 }
 
 // 0 without a floor.

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Runner: measures the rows of a block in rounds, and compares all of them with the same floor.
 //
-//   floor, row 1, row 2 ... row n, floor;  floor, row 1 ... row n, floor;  ...
+//   line, floor, line, row 1, line, row 2, line ... row n, line, floor;  line, floor, line ...
 //   ratio of a row = median of its ratios in the rounds that count, each to the floor of that round
 //
 // A floor that was measured a minute ago cannot be compared, because the host may have moved the
 // processors (local/rounds.h), and so every round measures its floors again; two rows with
 // different measurements of a floor cannot be compared with each other, and so the rows of a round
-// share them. The floors are measured once more after a round of several rows. Rounds are repeated
-// until enough of them agree, or kMostTimes as many as planned were measured.
+// share them. A cache line is timed for a moment before and after each row and each floor, to find
+// the rounds that count; rounds are repeated until enough of them agree, or kMostTimes as many as
+// planned were measured. The floors are measured once more after a round of several rows: if they
+// have moved meanwhile, its rows say so.
 //
 // Threads  the runner's only one.
 #pragma once
@@ -35,9 +37,12 @@ class Runner {
  public:
   static constexpr int kMostTimes = 2;
 
-  // `all` must outlive the runner; it contains the floors.
-  Runner(Placement placement, const std::vector<Measurement>& all) noexcept
-      : placement_(std::move(placement)), all_(all) {}
+  //   all   contains the floors
+  //   line  times a cache line; nullptr: lines are not timed
+  // Both must outlive the runner.
+  Runner(Placement placement, const std::vector<Measurement>& all,
+         const Measurement* line = nullptr) noexcept
+      : placement_(std::move(placement)), all_(all), line_(line) {}
 
   // The results of the rows, in their order.
   [[nodiscard]] std::vector<Result> run(std::vector<PlannedRow> block);
@@ -47,6 +52,7 @@ class Runner {
   struct Floor {
     const Measurement* row = nullptr;  // nullptr: not among `all`
     Budget budget;
+    LineTimes lines;
     double beforeNs = 0;
     double afterNs = 0;
   };
@@ -55,12 +61,17 @@ class Runner {
   bool measureRound(const std::vector<PlannedRow>& block, int round, std::vector<Result>& results,
                     std::vector<Rounds>& rounds);
   [[nodiscard]] std::string enter(const Measurement& row);
-  // The floor of a row, which is measured the first time in a round.
-  [[nodiscard]] const Floor& floorOf(const Measurement& row, Budget budget, Floors& floors);
+  // The floor of a row, which is measured the first time in a round. `lineNs` is the time of a line
+  // before this, and becomes that after it.
+  [[nodiscard]] const Floor& floorOf(const Measurement& row, Budget budget, Floors& floors,
+                                     double& lineNs);
   [[nodiscard]] double measure(const Floor& floor) const;
+  // How long a cache line takes now; 0: lines are not timed.
+  [[nodiscard]] double timeLine() const;
 
   Placement placement_;
   const std::vector<Measurement>& all_;
+  const Measurement* line_;
   std::unique_ptr<Environment> environment_;  // of the last row; the next row may use it again
   std::string current_;
   std::map<std::string, std::string> missing_;

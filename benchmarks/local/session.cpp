@@ -164,7 +164,7 @@ std::optional<Placement> place(const Options& options, bool mayShare) {
 
 std::vector<Result> takeAll(const std::vector<Measurement>& rows, const Placement& placement,
                             const Options& options, const Pace& pace) {
-  Runner runner(placement, rows);
+  Runner runner(placement, rows, pace.line ? &*pace.line : nullptr);
   std::vector<Result> results;
   for (auto begin = rows.begin(); begin != rows.end();) {
     const auto end = endOfBlock(begin, rows.end(), pace);

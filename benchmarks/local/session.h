@@ -43,6 +43,7 @@ struct Pace {
   Nanoseconds quickRun{};  // of all rows together in a quick run, without the time to set up
   std::function<int(const Measurement&)> rounds;
   bool sharesFloors = false;  // successive rows of one question are a block; see Runner
+  std::optional<Measurement> line{};  // see Runner
 };
 
 // The rows that the user asked for, and their floors.

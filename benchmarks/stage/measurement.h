@@ -47,6 +47,9 @@ struct Result {
   // The floor after a round divided by that before it, or the inverse if that is larger: median of
   // the rounds. 0: the row has no floor.
   double floorDrift = 0;
+  // The longest time of a cache line beside the row and its floor divided by the shortest one:
+  // median of the rounds. 0: not measured.
+  double lineDrift = 0;
   Disturbance disturbance;  // of the rounds together
 
   [[nodiscard]] bool isGood() const noexcept {
@@ -54,13 +57,16 @@ struct Result {
   }
   [[nodiscard]] double costNs() const noexcept { return isGood() ? bench::costNs(figures) : 0; }
   [[nodiscard]] bool hasFloorMoved() const noexcept { return floorDrift > kLargeDrift; }
+  [[nodiscard]] bool haveLinesMoved() const noexcept { return lineDrift > kLargeLineDrift; }
   [[nodiscard]] bool hadLessCpu() const noexcept { return disturbance.isLarge(measurement.mode); }
   // Whether this row is noise; see README.md, "Rows that were disturbed".
   [[nodiscard]] bool isDisturbed() const noexcept {
-    return isGood() && (hadLessCpu() || hasFloorMoved());
+    return isGood() && (hadLessCpu() || hasFloorMoved() || haveLinesMoved());
   }
 
   static constexpr double kLargeDrift = 1.25;
+  // A host that moves a processor changes it by more, and short measurements differ by less.
+  static constexpr double kLargeLineDrift = 1.5;
 };
 
 // All rows of `mpf bench local`, in order, floors first.

@@ -106,9 +106,12 @@ TEST(Json, SaysHowMuchARowWasDisturbed) {
 TEST(Table, MarksRowsThatWereDisturbed) {
   auto moved = disturbed(0.01);
   moved.floorDrift = 2;
+  auto far = disturbed(0.01);
+  far.lineDrift = 4;
 
   EXPECT_THAT(table({disturbed(0.25)}), HasSubstr("disturbed: others took 25 % of the CPUs"));
   EXPECT_THAT(table({moved}), HasSubstr("disturbed: floor moved x 2.00"));
+  EXPECT_THAT(table({far}), HasSubstr("disturbed: cache lines moved x 4.00"));
   EXPECT_THAT(table({disturbed(0.01)}), testing::Not(HasSubstr("disturbed")));
 }
 

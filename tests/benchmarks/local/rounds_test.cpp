@@ -6,14 +6,16 @@
 namespace mpf::bench {
 namespace {
 
-// A round with these floors before and after it, in which a message cost `ns`.
-Round costing(double ns, double before, double after, double takenNs = 0) {
+// A round in which a message cost `ns`, and a cache line these times before and after it.
+Round costing(double ns, double lineBefore, double lineAfter, double takenNs = 0) {
   Round round;
   round.figures.typicalNs = ns;
   round.figures.latency.add(static_cast<std::uint64_t>(ns));
   round.disturbance = {takenNs, 100, 0};
-  round.floorBeforeNs = before;
-  round.floorAfterNs = after;
+  round.lines.add(lineBefore);
+  round.lines.add(lineAfter);
+  round.floorBeforeNs = lineBefore;
+  round.floorAfterNs = lineBefore;
   return round;
 }
 
@@ -27,25 +29,25 @@ Result resultOf(const std::vector<Round>& all) {
 }
 
 TEST(Rounds, OnlyCalmRoundsCount) {
-  const auto result = resultOf({costing(150, 100, 100), costing(500, 100, 400, 100)});
+  const auto result = resultOf({costing(150, 100, 110), costing(500, 100, 400, 100)});
 
   EXPECT_EQ(result.rounds, 1u);
   EXPECT_DOUBLE_EQ(result.costNs(), 150);
   EXPECT_EQ(result.figures.latency.count(), 1u);
   EXPECT_DOUBLE_EQ(result.disturbance.share(), 0) << "only that of the round that counts";
-  EXPECT_FALSE(result.hasFloorMoved());
+  EXPECT_FALSE(result.haveLinesMoved());
 }
 
 TEST(Rounds, TheLargestGroupThatAgreesCounts) {
   const auto result =
-      resultOf({costing(150, 100, 100), costing(450, 400, 400), costing(500, 410, 400)});
+      resultOf({costing(150, 100, 100), costing(450, 400, 400), costing(500, 410, 420)});
 
   EXPECT_EQ(result.rounds, 2u);
   EXPECT_DOUBLE_EQ(result.floorNs, 405);
   EXPECT_DOUBLE_EQ(result.costNs(), 475);
 }
 
-TEST(Rounds, OfEqualGroupsTheOneWithTheLowerFloorCounts) {
+TEST(Rounds, OfEqualGroupsTheOneWithTheFasterLinesCounts) {
   const auto result = resultOf({costing(450, 400, 400), costing(150, 100, 100)});
 
   EXPECT_DOUBLE_EQ(result.floorNs, 100);
@@ -56,12 +58,25 @@ TEST(Rounds, AllCountIfNoneWasCalm) {
   const auto result = resultOf({costing(150, 100, 400), costing(450, 400, 100)});
 
   EXPECT_EQ(result.rounds, 2u);
-  EXPECT_TRUE(result.hasFloorMoved());
+  EXPECT_DOUBLE_EQ(result.lineDrift, 4);
+  EXPECT_TRUE(result.haveLinesMoved() && result.isDisturbed());
 }
 
-TEST(Rounds, AFloorThatWasMeasuredOnceIsCalm) {
-  EXPECT_EQ(resultOf({costing(150, 100, 0)}).rounds, 1u);
-  EXPECT_DOUBLE_EQ(resultOf({costing(150, 0, 0)}).ratioToFloor, 0) << "no floor";
+TEST(Rounds, AllCountIfLinesWereNotTimed) {
+  const auto result = resultOf({costing(150, 0, 0), costing(450, 0, 0)});
+
+  EXPECT_EQ(result.rounds, 2u);
+  EXPECT_FALSE(result.isDisturbed());
+}
+
+TEST(Rounds, ShowHowFarTheFloorMoved) {
+  auto round = costing(150, 100, 100);
+  round.floorAfterNs = 50;
+
+  const auto result = resultOf({round});
+
+  EXPECT_DOUBLE_EQ(result.floorDrift, 2);
+  EXPECT_TRUE(result.hasFloorMoved());
 }
 
 }  // namespace
