@@ -126,6 +126,20 @@ void checkNumbers(nb::handle elements) {
   throw nb::python_error();
 }
 
+template <class T>
+inline constexpr const char* kUnfit = "the elements are not 32-bit integers";
+template <>
+inline constexpr const char* kUnfit<Float64Array> = "an element is too large for a 64-bit float";
+
+// The elements as a contiguous array of T's type.
+template <class T>
+nb::object convertedTo(nb::handle elements) try {
+  return numpy(Numpy::asArray)(elements, numpy(kElementType<T>), "C");
+} catch (const nb::python_error& error) {
+  if (!error.matches(PyExc_OverflowError)) throw;
+  throw nb::value_error(kUnfit<T>);
+}
+
 // Sets the elements of a message that Python creates.
 template <class T>
 void setValues(PyArray<T>& array, nb::handle value) {
@@ -136,12 +150,12 @@ void setValues(PyArray<T>& array, nb::handle value) {
     if (dimensions == 0) raiseWrongType({kClassName<T>, "value"}, "an array", value);
     if (dimensions != 1) throw nb::value_error("the elements must have one dimension");
     checkNumbers<T>(given);
-    // Of a list, numpy reports integers that do not fit; of an array, it would wrap them.
+    // Of a list, numpy refuses integers that do not fit; of an array, it would wrap them.
     const nb::handle source = std::is_same_v<T, Int32Array> ? value : nb::handle(given);
-    array.values = numpy(Numpy::asArray)(source, numpy(kElementType<T>), "C");
+    array.values = convertedTo<T>(source);
     if (std::is_same_v<T, Int32Array> && !array.values.is(given) &&
         !nb::cast<bool>(numpy(Numpy::arrayEqual)(array.values, given)))
-      throw nb::value_error("the elements are not 32-bit integers");
+      throw nb::value_error(kUnfit<T>);
   } else {
     array.values = nb::isinstance<nb::str>(value) ? value.attr("encode")() : nb::borrow(value);
     static_cast<void>(lengthOf(array));  // throws unless it has a contiguous buffer

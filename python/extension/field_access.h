@@ -169,7 +169,7 @@ void addFields(Class& type) {
   std::apply([&](const auto&... field) { (add(field), ...); }, T::fields());
 }
 
-// "Int32(value=3, cmd=1)": fields that are 0 are omitted.
+// "Int32(value=3, cmd=1)", as an expression that makes the message: fields that are 0 are omitted.
 //   value  the text for the value, or empty
 template <class T>
 std::string describe(const char* className, const T& fields, const std::string& value) {
@@ -183,10 +183,16 @@ std::string describe(const char* className, const T& fields, const std::string& 
     if constexpr (!requires { field.used; }) {
       const auto attribute = toAttribute(fields.*field.member);
       if (attribute == decltype(attribute){} || field.name == kValueName) return;
+      if (field.name == kUsedBytesOfEom) return;
       append(attributeName(field.name), nb::cast<std::string>(nb::repr(nb::cast(attribute))));
     }
   };
   std::apply([&](const auto&... field) { (add(field), ...); }, T::fields());
+  if constexpr (requires { fields.eom(); }) {
+    const auto eom = fields.eom();
+    if (!eom.empty())
+      append("eom", nb::cast<std::string>(nb::repr(nb::bytes(eom.data(), eom.size()))));
+  }
   return std::string(className) + "(" + text + ")";
 }
 

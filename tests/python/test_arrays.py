@@ -138,9 +138,11 @@ def test_elements_are_converted(client: mpf.Client) -> None:
         8.0,
     ]
     assert mpf.Int32Array(np.arange(3.0)).value.tolist() == [0, 1, 2]
-    for values in ([1.5], np.array([1 << 40])):
+    for values in ([1.5], np.array([1 << 40]), [1 << 40], [1 << 70]):
         with pytest.raises(ValueError, match="32-bit"):
             mpf.Int32Array(values)
+    with pytest.raises(ValueError, match="too large"):
+        mpf.Float64Array([10**400])
     with pytest.raises(ValueError, match="one dimension"):
         mpf.Float64Array(np.zeros((2, 2)))
 
@@ -160,7 +162,9 @@ def test_text_and_bytes(client: mpf.Client) -> None:
     assert client.char8_array("µV").text == "µV"
     assert client.char8_array(bytes(range(256))).value == bytes(range(256))
     assert client.char8_array(b"").value == b""
-    assert client.call(mpf.Char8Array("*IDN?", eom=b"\r\n")).eom == b"\r\n"
+    reply = client.call(mpf.Char8Array("*IDN?", eom=b"\r\n"))
+    assert reply.eom == b"\r\n"
+    assert repr(reply) == "Char8Array(value=b'*IDN?', eom=b'\\r\\n')"
 
 
 def test_user_messages_carry_any_buffer(client: mpf.Client) -> None:
