@@ -2,7 +2,6 @@
 #include "benchmarks/local/rounds.h"
 
 #include <algorithm>
-#include <functional>
 #include <iterator>
 
 namespace mpf::bench {
@@ -42,6 +41,18 @@ Figures combined(const std::vector<Round>& rounds) {
   return figures;
 }
 
+// The highest floor of these rounds divided by the lowest one; 0 with only one.
+double floorDrift(const std::vector<Round>& rounds) {
+  std::vector<double> floors;
+  for (const auto& round : rounds) {
+    for (const auto ns : {round.floorBeforeNs, round.floorAfterNs})
+      if (ns > 0) floors.push_back(ns);
+  }
+  if (floors.size() < 2) return 0;
+  const auto [lowest, highest] = std::ranges::minmax(floors);
+  return highest / lowest;
+}
+
 }  // namespace
 
 void LineTimes::add(double ns) noexcept {
@@ -52,11 +63,6 @@ void LineTimes::add(const LineTimes& other) noexcept {
   if (other.lowestNs <= 0) return;
   lowestNs = lowestNs > 0 ? std::min(lowestNs, other.lowestNs) : other.lowestNs;
   highestNs = std::max(highestNs, other.highestNs);
-}
-
-double Round::floorDrift() const noexcept {
-  if (floorBeforeNs <= 0 || floorAfterNs <= 0) return 0;
-  return std::max(floorBeforeNs, floorAfterNs) / std::min(floorBeforeNs, floorAfterNs);
 }
 
 std::vector<Round> Rounds::agreeingRounds() const {
@@ -81,7 +87,7 @@ void Rounds::writeTo(Result& result) const {
   result.figures = combined(rounds);
   for (const auto& round : rounds) result.disturbance.add(round.disturbance);
   result.rounds = rounds.size();
-  result.floorDrift = medianOf(rounds, std::mem_fn(&Round::floorDrift));
+  result.floorDrift = floorDrift(rounds);
   result.lineDrift = medianOf(rounds, [](const Round& round) { return round.lines.drift(); });
   if (result.measurement.floorName.empty() || rounds.front().floorBeforeNs <= 0) return;
   result.floorNs = medianOf(rounds, [](const Round& round) { return round.floorBeforeNs; });

@@ -35,8 +35,6 @@ struct Round {
   double floorBeforeNs = 0;  // 0: the row has no floor
   double floorAfterNs = 0;  // 0: not measured
 
-  // The larger one of both floors divided by the other; 0 without both.
-  [[nodiscard]] double floorDrift() const noexcept;
   [[nodiscard]] bool isCalm() const noexcept { return lines.drift() <= Result::kLargeLineDrift; }
 };
 

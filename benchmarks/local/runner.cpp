@@ -25,6 +25,8 @@ std::vector<Result> Runner::run(std::vector<PlannedRow> block) {
   std::vector<Result> results(block.size());
   std::vector<Rounds> rounds(block.size());
   for (std::size_t i = 0; i < block.size(); ++i) results[i].measurement = std::move(block[i].row);
+  timesLines_ = line_ != nullptr &&
+                std::ranges::any_of(block, [](const auto& row) { return row.rounds > 1; });
   for (int round = 0; measureRound(block, round, results, rounds); ++round) continue;
   for (std::size_t i = 0; i < block.size(); ++i) rounds[i].writeTo(results[i]);
   return results;
@@ -55,7 +57,7 @@ bool Runner::measureRound(const std::vector<PlannedRow>& block, int round,
     rounds[i].add({std::move(outcome.figures), disturbance, lines, floor.beforeNs});
     result.error = std::move(outcome.error);
   }
-  if (block.size() == 1) return !compared.empty();
+  if (block.size() == 1 || timesLines_) return !compared.empty();
   for (auto& [key, floor] : floors) floor.afterNs = measure(floor);
   for (const auto& [index, floor] : compared) rounds[index].setFloorAfter(floor->afterNs);
   return !compared.empty();
@@ -95,7 +97,7 @@ const Runner::Floor& Runner::floorOf(const Measurement& row, Budget budget, Floo
 }
 
 double Runner::timeLine() const {
-  if (line_ == nullptr) return 0;
+  if (!timesLines_) return 0;
   return costNs(line_->run(Stage(placement_, {kWarmLine, kTimeLine})).figures);
 }
 

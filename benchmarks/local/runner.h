@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Runner: measures the rows of a block in rounds, and compares all of them with the same floor.
 //
-//   line, floor, line, row 1, line, row 2, line ... row n, line, floor;  line, floor, line ...
+//   line, floor, line, row 1, line, row 2, line ... row n, line;  line, floor, line, row 1 ...
 //   ratio of a row = median of its ratios in the rounds that count, each to the floor of that round
 //
 // A floor that was measured a minute ago cannot be compared, because the host may have moved the
 // processors (local/rounds.h), and so every round measures its floors again; two rows with
 // different measurements of a floor cannot be compared with each other, and so the rows of a round
-// share them. A cache line is timed for a moment before and after each row and each floor, to find
-// the rounds that count; rounds are repeated until enough of them agree, or kMostTimes as many as
-// planned were measured. The floors are measured once more after a round of several rows: if they
-// have moved meanwhile, its rows say so.
+// share them. In blocks of several rounds a cache line is timed for a moment before and after each
+// row and each floor, to find the rounds that count; rounds are repeated until enough of them
+// agree, or kMostTimes as many as planned were measured. Where lines are not timed, the floors are
+// measured once more after a round of several rows.
 //
 // Threads  the runner's only one.
 #pragma once
@@ -72,6 +72,7 @@ class Runner {
   Placement placement_;
   const std::vector<Measurement>& all_;
   const Measurement* line_;
+  bool timesLines_ = false;  // in this block
   std::unique_ptr<Environment> environment_;  // of the last row; the next row may use it again
   std::string current_;
   std::map<std::string, std::string> missing_;

@@ -15,7 +15,6 @@ Round costing(double ns, double lineBefore, double lineAfter, double takenNs = 0
   round.lines.add(lineBefore);
   round.lines.add(lineAfter);
   round.floorBeforeNs = lineBefore;
-  round.floorAfterNs = lineBefore;
   return round;
 }
 
@@ -73,10 +72,10 @@ TEST(Rounds, ShowHowFarTheFloorMoved) {
   auto round = costing(150, 100, 100);
   round.floorAfterNs = 50;
 
-  const auto result = resultOf({round});
-
-  EXPECT_DOUBLE_EQ(result.floorDrift, 2);
-  EXPECT_TRUE(result.hasFloorMoved());
+  EXPECT_DOUBLE_EQ(resultOf({round}).floorDrift, 2) << "during the round";
+  EXPECT_TRUE(resultOf({round}).hasFloorMoved());
+  EXPECT_DOUBLE_EQ(resultOf({costing(150, 100, 100), costing(200, 140, 140)}).floorDrift, 1.4)
+      << "between rounds";
 }
 
 }  // namespace
