@@ -2,6 +2,7 @@
 #include "benchmarks/local/rounds.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <iterator>
 
 namespace mpf::bench {
@@ -41,7 +42,8 @@ Figures combined(const std::vector<Round>& rounds) {
   return figures;
 }
 
-// The highest floor of these rounds divided by the lowest one; 0 with only one.
+// Of the floors of more than half of these rounds, those closest to each other: the highest divided
+// by the lowest one. 0 with only one floor.
 double floorDrift(const std::vector<Round>& rounds) {
   std::vector<double> floors;
   for (const auto& round : rounds) {
@@ -49,8 +51,12 @@ double floorDrift(const std::vector<Round>& rounds) {
       if (ns > 0) floors.push_back(ns);
   }
   if (floors.size() < 2) return 0;
-  const auto [lowest, highest] = std::ranges::minmax(floors);
-  return highest / lowest;
+  std::ranges::sort(floors);
+  const auto most = floors.size() / 2 + 1;
+  auto drift = floors.back() / floors.front();
+  for (std::size_t first = 0; first + most <= floors.size(); ++first)
+    drift = std::min(drift, floors[first + most - 1] / floors[first]);
+  return drift;
 }
 
 }  // namespace
@@ -65,34 +71,50 @@ void LineTimes::add(const LineTimes& other) noexcept {
   highestNs = std::max(highestNs, other.highestNs);
 }
 
-std::vector<Round> Rounds::agreeingRounds() const {
-  std::vector<Round> calm;
-  std::ranges::copy_if(rounds_, std::back_inserter(calm), &Round::isCalm);
-  const auto lowest = [](const Round& round) { return round.lines.lowestNs; };
-  std::ranges::sort(calm, {}, lowest);
-  auto best = std::ranges::subrange(calm.begin(), calm.begin());
-  for (auto begin = calm.begin(); begin != calm.end(); ++begin) {
-    const auto end = std::find_if(begin, calm.end(), [&](const Round& round) {
-      return lowest(round) > lowest(*begin) * Result::kLargeLineDrift;
-    });
-    if (end - begin > std::ssize(best)) best = {begin, end};
-  }
-  return {best.begin(), best.end()};
+bool Round::isCalmWith(double lineNs) const noexcept {
+  constexpr auto kMost = Result::kLargeLineDrift;
+  return lines.drift() <= kMost && lines.lowestNs >= lineNs && lines.lowestNs <= lineNs * kMost;
 }
 
-void Rounds::writeTo(Result& result) const {
-  auto rounds = agreeingRounds();
-  if (rounds.empty()) rounds = rounds_;
+void Rounds::writeTo(Result& result, double lineNs) const {
+  std::vector<Round> calm;
+  std::ranges::copy_if(rounds_, std::back_inserter(calm),
+                       [&](const Round& round) { return round.isCalmWith(lineNs); });
+  const auto& rounds = calm.empty() ? rounds_ : calm;
   if (rounds.empty()) return;
   result.figures = combined(rounds);
   for (const auto& round : rounds) result.disturbance.add(round.disturbance);
   result.rounds = rounds.size();
   result.floorDrift = floorDrift(rounds);
-  result.lineDrift = medianOf(rounds, [](const Round& round) { return round.lines.drift(); });
+  result.lineDrift = medianOf(rounds, [&](Round round) {
+    if (calm.empty()) round.lines.add(lineNs);
+    return round.lines.drift();
+  });
   if (result.measurement.floorName.empty() || rounds.front().floorBeforeNs <= 0) return;
   result.floorNs = medianOf(rounds, [](const Round& round) { return round.floorBeforeNs; });
   result.ratioToFloor = medianOf(
       rounds, [](const Round& round) { return costNs(round.figures) / round.floorBeforeNs; });
+}
+
+std::size_t fewestCalm(std::span<const Rounds* const> rows, double lineNs) {
+  auto fewest = SIZE_MAX;
+  for (const auto* row : rows) {
+    const auto count = std::ranges::count_if(
+        row->all(), [&](const Round& round) { return round.isCalmWith(lineNs); });
+    fewest = std::min(fewest, static_cast<std::size_t>(count));
+  }
+  return fewest;
+}
+
+double chooseLines(std::span<const Rounds* const> rows, std::size_t wanted) {
+  std::vector<double> times;
+  for (const auto* row : rows) {
+    for (const auto& round : row->all()) times.push_back(round.lines.lowestNs);
+  }
+  if (times.empty()) return 0;
+  std::ranges::sort(times);
+  return std::ranges::max(
+      times, {}, [&](double lineNs) { return std::min(fewestCalm(rows, lineNs), wanted); });
 }
 
 }  // namespace mpf::bench

@@ -4,13 +4,14 @@
 // A host may move the processors of a virtual machine at any time, and a cache line then needs 70
 // ns or 500 ns between the same two CPUs. A round of a row is calm if a cache line took about as
 // long before and after the row as before and after its floor. Calm rounds agree if it took about
-// as long in them, too. The largest group of rounds that agree counts, of equally large ones that
-// with the faster lines; if no round was calm, all count.
+// as long in them, too. The rows of a block use rounds that agree with each other; a row without
+// such a round uses all of its rounds.
 //
 // Threads  one.
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "benchmarks/stage/measurement.h"
@@ -35,7 +36,9 @@ struct Round {
   double floorBeforeNs = 0;  // 0: the row has no floor
   double floorAfterNs = 0;  // 0: not measured
 
-  [[nodiscard]] bool isCalm() const noexcept { return lines.drift() <= Result::kLargeLineDrift; }
+  // Whether it is calm, and the shortest time of a line was between `lineNs` and
+  // Result::kLargeLineDrift x `lineNs`.
+  [[nodiscard]] bool isCalmWith(double lineNs) const noexcept;
 };
 
 class Rounds {
@@ -43,15 +46,19 @@ class Rounds {
   void add(const Round& round) { rounds_.push_back(round); }
   // Of the round that was added last.
   void setFloorAfter(double ns) noexcept { rounds_.back().floorAfterNs = ns; }
-  // The number of rounds in the largest group that agrees.
-  [[nodiscard]] std::size_t agreeing() const { return agreeingRounds().size(); }
-  // Sets the figures, the floor and what disturbed them.
-  void writeTo(Result& result) const;
+  // Sets the figures, the floor and what disturbed them, from the rounds that are calm with these
+  // lines.
+  void writeTo(Result& result, double lineNs) const;
+  [[nodiscard]] const std::vector<Round>& all() const noexcept { return rounds_; }
 
  private:
-  [[nodiscard]] std::vector<Round> agreeingRounds() const;
-
   std::vector<Round> rounds_;
 };
+
+// The time of a line with which each of these rows has `wanted` calm rounds, or as many as
+// possible. Of several times, the shortest.
+[[nodiscard]] double chooseLines(std::span<const Rounds* const> rows, std::size_t wanted);
+// The number of such rounds of the row that has the fewest.
+[[nodiscard]] std::size_t fewestCalm(std::span<const Rounds* const> rows, double lineNs);
 
 }  // namespace mpf::bench

@@ -10,57 +10,66 @@ namespace {
 
 constexpr std::chrono::milliseconds kWarmLine{2}, kTimeLine{10};
 
-// Whether a row is measured in this round, the first of which is 0.
-bool isDue(const PlannedRow& row, const Rounds& results, int round) {
-  const auto planned = std::max(row.rounds, 1);
-  if (round < planned) return true;
-  // A row with one round has no others that could agree with it.
-  return planned > 1 && round < Runner::kMostTimes * planned &&
-         results.agreeing() < static_cast<std::size_t>(planned);
-}
-
 }  // namespace
 
 std::vector<Result> Runner::run(std::vector<PlannedRow> block) {
-  std::vector<Result> results(block.size());
-  std::vector<Rounds> rounds(block.size());
-  for (std::size_t i = 0; i < block.size(); ++i) results[i].measurement = std::move(block[i].row);
-  timesLines_ = line_ != nullptr &&
-                std::ranges::any_of(block, [](const auto& row) { return row.rounds > 1; });
-  for (int round = 0; measureRound(block, round, results, rounds); ++round) continue;
-  for (std::size_t i = 0; i < block.size(); ++i) rounds[i].writeTo(results[i]);
+  Block all(block.size());
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    all[i].budget = block[i].budget;
+    all[i].planned = std::max(block[i].rounds, 1);
+    all[i].result.measurement = std::move(block[i].row);
+  }
+  const auto most = std::ranges::max(all, {}, &Row::planned).planned;
+  timesLines_ = line_ != nullptr && most > 1;
+  double lineNs = 0;
+  for (int round = 0; round < (timesLines_ ? kMostTimes : 1) * most; ++round) {
+    const auto repeated = repeatedIn(all);
+    if (round >= most && fewestCalm(repeated, lineNs) >= static_cast<std::size_t>(most)) break;
+    measureRound(all, round);
+    lineNs = chooseLines(repeated, static_cast<std::size_t>(most));
+  }
+  std::vector<Result> results;
+  for (auto& row : all) {
+    row.rounds.writeTo(row.result, lineNs);
+    results.push_back(std::move(row.result));
+  }
   return results;
 }
 
-// Returns false if no row is measured in this round.
-bool Runner::measureRound(const std::vector<PlannedRow>& block, int round,
-                          std::vector<Result>& results, std::vector<Rounds>& rounds) {
+// The rounds of the rows that are measured more than once.
+std::vector<const Rounds*> Runner::repeatedIn(const Block& block) {
+  std::vector<const Rounds*> rounds;
+  for (const auto& row : block) {
+    if (row.planned > 1 && row.result.isGood()) rounds.push_back(&row.rounds);
+  }
+  return rounds;
+}
+
+void Runner::measureRound(Block& block, int round) {
   Floors floors;
-  std::map<std::size_t, const Floor*> compared;  // by index of a row of this round
+  std::map<Row*, const Floor*> compared;
   double lineNs = 0;
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    auto& result = results[i];
-    auto& row = result.measurement;
-    if (!result.isGood() || !isDue(block[i], rounds[i], round)) continue;
-    row.skipped = enter(row);
-    if (!row.skipped.empty()) continue;
+  for (auto& row : block) {
+    auto& what = row.result.measurement;
+    if (!row.result.isGood() || (row.planned == 1 && round > 0)) continue;
+    what.skipped = enter(what);
+    if (!what.skipped.empty()) continue;
     if (compared.empty()) lineNs = timeLine();
-    const auto& floor = floorOf(row, block[i].budget, floors, lineNs);
-    compared[i] = &floor;
+    const auto& floor = floorOf(what, row.budget, floors, lineNs);
+    compared[&row] = &floor;
     auto lines = floor.lines;
     lines.add(lineNs);
     const DisturbanceMeter meter(placement_);
-    auto outcome = row.run(Stage(placement_, block[i].budget));
+    auto outcome = what.run(Stage(placement_, row.budget));
     const auto disturbance = meter.read();
     lineNs = timeLine();
     lines.add(lineNs);
-    rounds[i].add({std::move(outcome.figures), disturbance, lines, floor.beforeNs});
-    result.error = std::move(outcome.error);
+    row.rounds.add({std::move(outcome.figures), disturbance, lines, floor.beforeNs});
+    row.result.error = std::move(outcome.error);
   }
-  if (block.size() == 1 || timesLines_) return !compared.empty();
+  if (block.size() == 1 || timesLines_) return;
   for (auto& [key, floor] : floors) floor.afterNs = measure(floor);
-  for (const auto& [index, floor] : compared) rounds[index].setFloorAfter(floor->afterNs);
-  return !compared.empty();
+  for (const auto& [row, floor] : compared) row->rounds.setFloorAfter(floor->afterNs);
 }
 
 // Starts the environment of this row. Empty, or why it cannot be started; it is not tried again.

@@ -58,8 +58,15 @@ class Runner {
   };
   // By setting, name and bytes.
   using Floors = std::map<std::tuple<std::string, std::string, std::size_t>, Floor>;
-  bool measureRound(const std::vector<PlannedRow>& block, int round, std::vector<Result>& results,
-                    std::vector<Rounds>& rounds);
+  struct Row {
+    Budget budget;
+    int planned = 1;  // rounds
+    Rounds rounds;
+    Result result;
+  };
+  using Block = std::vector<Row>;
+  [[nodiscard]] static std::vector<const Rounds*> repeatedIn(const Block& block);
+  void measureRound(Block& block, int round);
   [[nodiscard]] std::string enter(const Measurement& row);
   // The floor of a row, which is measured the first time in a round. `lineNs` is the time of a line
   // before this, and becomes that after it.

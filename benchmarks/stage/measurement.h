@@ -44,8 +44,8 @@ struct Result {
   std::size_t rounds = 0;   // that count: see local/rounds.h
   double floorNs = 0;       // a message of the floor, measured in the rounds of the row
   double ratioToFloor = 0;  // above 1: slower than the floor; 0: the row has no floor
-  // The highest value of the floor in the rounds divided by the lowest one. 0: it was measured at
-  // most once.
+  // Of the floor's values in more than half of the rounds, the highest divided by the lowest one.
+  // 0: it was measured at most once.
   double floorDrift = 0;
   // The longest time of a cache line beside the row and its floor divided by the shortest one:
   // median of the rounds. 0: not measured.

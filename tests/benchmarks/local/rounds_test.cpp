@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "benchmarks/local/rounds.h"
 
+#include <array>
 #include <gtest/gtest.h>
 
 namespace mpf::bench {
@@ -18,12 +19,19 @@ Round costing(double ns, double lineBefore, double lineAfter, double takenNs = 0
   return round;
 }
 
-Result resultOf(const std::vector<Round>& all) {
+Rounds of(const std::vector<Round>& all) {
   Rounds rounds;
   for (const auto& round : all) rounds.add(round);
+  return rounds;
+}
+
+// Of a row that is alone in its block.
+Result resultOf(const std::vector<Round>& all) {
+  const auto rounds = of(all);
+  const std::array rows{&rounds};
   Result result;
   result.measurement.floorName = "floor";
-  rounds.writeTo(result);
+  rounds.writeTo(result, chooseLines(rows, 3));
   return result;
 }
 
@@ -37,7 +45,7 @@ TEST(Rounds, OnlyCalmRoundsCount) {
   EXPECT_FALSE(result.haveLinesMoved());
 }
 
-TEST(Rounds, TheLargestGroupThatAgreesCounts) {
+TEST(Rounds, ThoseWithTheSameLinesCount) {
   const auto result =
       resultOf({costing(150, 100, 100), costing(450, 400, 400), costing(500, 410, 420)});
 
@@ -46,11 +54,25 @@ TEST(Rounds, TheLargestGroupThatAgreesCounts) {
   EXPECT_DOUBLE_EQ(result.costNs(), 475);
 }
 
-TEST(Rounds, OfEqualGroupsTheOneWithTheFasterLinesCounts) {
+TEST(Rounds, TheFasterLinesCountIfBothHaveAsManyRounds) {
   const auto result = resultOf({costing(450, 400, 400), costing(150, 100, 100)});
 
   EXPECT_DOUBLE_EQ(result.floorNs, 100);
   EXPECT_DOUBLE_EQ(result.ratioToFloor, 1.5);
+}
+
+TEST(Rounds, AllRowsOfABlockUseTheSameLines) {
+  const auto near = costing(150, 100, 100);
+  const auto far = costing(450, 400, 400);
+  const auto moved = costing(300, 100, 400);
+  const auto mostlyNear = of({near, near, near, far, far});
+  const auto mostlyFar = of({moved, moved, near, far, far});
+  const std::array rows{&mostlyNear, &mostlyFar};
+
+  EXPECT_DOUBLE_EQ(chooseLines(rows, 3), 400) << "two rounds of each row";
+  EXPECT_DOUBLE_EQ(chooseLines(rows, 1), 100) << "one round of each row";
+  EXPECT_EQ(fewestCalm(rows, 400), 2u);
+  EXPECT_EQ(fewestCalm(rows, 100), 1u);
 }
 
 TEST(Rounds, AllCountIfNoneWasCalm) {
@@ -61,6 +83,14 @@ TEST(Rounds, AllCountIfNoneWasCalm) {
   EXPECT_TRUE(result.haveLinesMoved() && result.isDisturbed());
 }
 
+TEST(Rounds, ARowWithOtherLinesThanItsBlockIsDisturbed) {
+  Result result;
+  of({costing(450, 400, 400)}).writeTo(result, 100);
+
+  EXPECT_EQ(result.rounds, 1u);
+  EXPECT_DOUBLE_EQ(result.lineDrift, 4);
+}
+
 TEST(Rounds, AllCountIfLinesWereNotTimed) {
   const auto result = resultOf({costing(150, 0, 0), costing(450, 0, 0)});
 
@@ -68,14 +98,19 @@ TEST(Rounds, AllCountIfLinesWereNotTimed) {
   EXPECT_FALSE(result.isDisturbed());
 }
 
-TEST(Rounds, ShowHowFarTheFloorMoved) {
+// A round beside which the floor took these times.
+Round withFloor(double before, double after = 0) {
   auto round = costing(150, 100, 100);
-  round.floorAfterNs = 50;
+  round.floorBeforeNs = before;
+  round.floorAfterNs = after;
+  return round;
+}
 
-  EXPECT_DOUBLE_EQ(resultOf({round}).floorDrift, 2) << "during the round";
-  EXPECT_TRUE(resultOf({round}).hasFloorMoved());
-  EXPECT_DOUBLE_EQ(resultOf({costing(150, 100, 100), costing(200, 140, 140)}).floorDrift, 1.4)
-      << "between rounds";
+TEST(Rounds, ShowHowFarTheFloorMoved) {
+  EXPECT_DOUBLE_EQ(resultOf({withFloor(100, 50)}).floorDrift, 2) << "during the round";
+  EXPECT_DOUBLE_EQ(resultOf({withFloor(100), withFloor(140)}).floorDrift, 1.4) << "between rounds";
+  EXPECT_DOUBLE_EQ(resultOf({withFloor(100), withFloor(110), withFloor(200)}).floorDrift, 1.1)
+      << "most rounds agree";
 }
 
 }  // namespace
