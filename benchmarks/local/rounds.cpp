@@ -59,6 +59,11 @@ double floorDrift(const std::vector<Round>& rounds) {
   return drift;
 }
 
+std::size_t countCalm(const Rounds& row, double lineNs) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      row.all(), [&](const Round& round) { return round.isCalmWith(lineNs); }));
+}
+
 }  // namespace
 
 void LineTimes::add(double ns) noexcept {
@@ -98,11 +103,7 @@ void Rounds::writeTo(Result& result, double lineNs) const {
 
 std::size_t fewestCalm(std::span<const Rounds* const> rows, double lineNs) {
   auto fewest = SIZE_MAX;
-  for (const auto* row : rows) {
-    const auto count = std::ranges::count_if(
-        row->all(), [&](const Round& round) { return round.isCalmWith(lineNs); });
-    fewest = std::min(fewest, static_cast<std::size_t>(count));
-  }
+  for (const auto* row : rows) fewest = std::min(fewest, countCalm(*row, lineNs));
   return fewest;
 }
 
@@ -113,8 +114,11 @@ double chooseLines(std::span<const Rounds* const> rows, std::size_t wanted) {
   }
   if (times.empty()) return 0;
   std::ranges::sort(times);
-  return std::ranges::max(
-      times, {}, [&](double lineNs) { return std::min(fewestCalm(rows, lineNs), wanted); });
+  return std::ranges::max(times, {}, [&](double lineNs) {
+    std::size_t sum = 0;
+    for (const auto* row : rows) sum += std::min(countCalm(*row, lineNs), wanted);
+    return sum;
+  });
 }
 
 }  // namespace mpf::bench

@@ -55,10 +55,10 @@ class Rounds {
   std::vector<Round> rounds_;
 };
 
-// The time of a line with which each of these rows has `wanted` calm rounds, or as many as
-// possible. Of several times, the shortest.
+// The time of a line with which these rows together have most calm rounds, of which no more than
+// `wanted` of each row are counted. Of several times, the shortest.
 [[nodiscard]] double chooseLines(std::span<const Rounds* const> rows, std::size_t wanted);
-// The number of such rounds of the row that has the fewest.
+// The number of rounds that are calm with these lines, of the row that has the fewest.
 [[nodiscard]] std::size_t fewestCalm(std::span<const Rounds* const> rows, double lineNs);
 
 }  // namespace mpf::bench

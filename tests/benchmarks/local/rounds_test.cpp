@@ -69,10 +69,18 @@ TEST(Rounds, AllRowsOfABlockUseTheSameLines) {
   const auto mostlyFar = of({moved, moved, near, far, far});
   const std::array rows{&mostlyNear, &mostlyFar};
 
-  EXPECT_DOUBLE_EQ(chooseLines(rows, 3), 400) << "two rounds of each row";
+  EXPECT_DOUBLE_EQ(chooseLines(rows, 2), 400) << "two rounds of each row; 100: two and one";
   EXPECT_DOUBLE_EQ(chooseLines(rows, 1), 100) << "one round of each row";
   EXPECT_EQ(fewestCalm(rows, 400), 2u);
   EXPECT_EQ(fewestCalm(rows, 100), 1u);
+}
+
+TEST(Rounds, ARowWithoutACalmRoundDoesNotChangeTheOthers) {
+  const auto calm = of({costing(450, 400, 400), costing(450, 400, 400)});
+  const auto never = of({costing(300, 40, 400), costing(300, 40, 400)});
+  const std::array rows{&calm, &never};
+
+  EXPECT_DOUBLE_EQ(chooseLines(rows, 3), 400);
 }
 
 TEST(Rounds, AllCountIfNoneWasCalm) {
