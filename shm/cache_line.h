@@ -3,9 +3,9 @@
 // to the shared cache.
 //
 // A line that another processor has read must come back before a write to it takes effect.
-// prefetchw fetches it without waiting (Intel processors before Broadwell ignore it). On an AMD
-// processor this takes longer than a message (Zen 3), or has hardly any effect on a line that is in
-// the cache of another processor (Zen 4): there, only a write fetches it in time.
+// prefetchw fetches it without waiting (Intel processors before Broadwell ignore it). On Zen 3 this
+// takes longer than a message, so it helps only far ahead; on Zen 4 it has hardly any effect. On
+// both, only a write fetches the line in time.
 //
 // Threads  request(), offer(): any; claim(): the thread that may write the field.
 #pragma once

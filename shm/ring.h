@@ -130,8 +130,8 @@ class RingProducer {
   // Fetches the line of the next slot while its message is made: for a thread that has taken a
   // message and will probably send one. Any thread.
   void expectPush() const noexcept { lines::request(&next()); }
-  // The same, also on a processor that does not request a line which the consumer polls. Claims the
-  // line, if messages are sent one by one. The thread that pushes.
+  // As expectPush(), but claims the line: a processor may ignore a request for a line that the
+  // consumer polls (Zen 4). Does nothing while fetchLines() claims. The thread that pushes.
   void claimNext() noexcept {
     if (step_ == 0 && pushed_ < freeEnd_) lines::claim(next().type);
   }
@@ -168,7 +168,7 @@ class RingProducer {
   //   near     the consumer may be about to read a slot that waits for the transfers of these lines
   //   stream   the consumer keeps a distance
   static constexpr std::uint64_t kStepNear = 8, kStepInStream = 16;
-  static constexpr std::uint64_t kRequestedInStream = 48;  // slots, behind those that come first
+  static constexpr std::uint64_t kRequestedInStream = 48;  // slots, behind those that are claimed
   static constexpr std::uint64_t kLookEvery = 16;  // slots, if no lines are claimed
   static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
   // Whether this side was idle before nearly each of the messages since the last call.

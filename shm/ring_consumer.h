@@ -153,7 +153,7 @@ class RingConsumer {
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
-  // Whether onEmpty() was called before the last message that was begun.
+  // Whether the last message begun is the first one since onEmpty(), or the first of all.
   [[nodiscard]] bool wasIdle() const noexcept { return messages_ == messagesBeforeIdle_ + 1; }
   // How often onEmpty() was called after further messages. Any thread.
   [[nodiscard]] std::uint64_t timesIdle() const noexcept {

@@ -21,7 +21,7 @@ std::string disturbanceText(const Result& result) {
   std::string text = "  disturbed:";
   if (result.hadLessCpu())
     text += fmt::format(" others took {:.0f} % of the CPUs", 100 * result.disturbance.share());
-  if (result.haveLinesMoved()) text += fmt::format(" cache lines moved x {:.2f}", result.lineDrift);
+  if (result.haveLinesMoved) text += fmt::format(" cache lines moved x {:.2f}", result.lineDrift);
   if (result.hasFloorMoved()) text += fmt::format(" floor moved x {:.2f}", result.floorDrift);
   return text;
 }

@@ -42,8 +42,8 @@ Figures combined(const std::vector<Round>& rounds) {
   return figures;
 }
 
-// Of the floors of more than half of these rounds, those closest to each other: the highest divided
-// by the lowest one. 0 with only one floor.
+// Of more than half of the floor's values, those closest to each other: the highest divided by the
+// lowest one. 0 with only one value.
 double floorDrift(const std::vector<Round>& rounds) {
   std::vector<double> floors;
   for (const auto& round : rounds) {
@@ -91,14 +91,16 @@ void Rounds::writeTo(Result& result, double lineNs) const {
   for (const auto& round : rounds) result.disturbance.add(round.disturbance);
   result.rounds = rounds.size();
   result.floorDrift = floorDrift(rounds);
+  result.haveLinesMoved = calm.empty();
   result.lineDrift = medianOf(rounds, [&](Round round) {
     if (calm.empty()) round.lines.add(lineNs);
     return round.lines.drift();
   });
-  if (result.measurement.floorName.empty() || rounds.front().floorBeforeNs <= 0) return;
-  result.floorNs = medianOf(rounds, [](const Round& round) { return round.floorBeforeNs; });
+  auto compared = rounds;
+  std::erase_if(compared, [](const Round& round) { return round.floorBeforeNs <= 0; });
+  result.floorNs = medianOf(compared, [](const Round& round) { return round.floorBeforeNs; });
   result.ratioToFloor = medianOf(
-      rounds, [](const Round& round) { return costNs(round.figures) / round.floorBeforeNs; });
+      compared, [](const Round& round) { return costNs(round.figures) / round.floorBeforeNs; });
 }
 
 std::size_t fewestCalm(std::span<const Rounds* const> rows, double lineNs) {

@@ -2,8 +2,10 @@
 #include "benchmarks/local/runner.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <exception>
+#include <utility>
 
 namespace mpf::bench {
 namespace {
@@ -30,7 +32,8 @@ std::vector<Result> Runner::run(std::vector<PlannedRow> block) {
   }
   std::vector<Result> results;
   for (auto& row : all) {
-    row.rounds.writeTo(row.result, lineNs);
+    const std::array alone{&std::as_const(row.rounds)};
+    row.rounds.writeTo(row.result, row.planned > 1 ? lineNs : chooseLines(alone, 1));
     results.push_back(std::move(row.result));
   }
   return results;

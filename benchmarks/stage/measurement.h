@@ -44,12 +44,13 @@ struct Result {
   std::size_t rounds = 0;   // that count: see local/rounds.h
   double floorNs = 0;       // a message of the floor, measured in the rounds of the row
   double ratioToFloor = 0;  // above 1: slower than the floor; 0: the row has no floor
-  // Of the floor's values in more than half of the rounds, the highest divided by the lowest one.
-  // 0: it was measured at most once.
+  // Of more than half of the floor's values, those closest to each other: the highest divided by
+  // the lowest one. 0: it was measured at most once.
   double floorDrift = 0;
   // The longest time of a cache line beside the row and its floor divided by the shortest one:
   // median of the rounds. 0: not measured.
   double lineDrift = 0;
+  bool haveLinesMoved = false;  // no round was calm with the lines of the block
   Disturbance disturbance;  // of the rounds together
 
   [[nodiscard]] bool isGood() const noexcept {
@@ -57,11 +58,10 @@ struct Result {
   }
   [[nodiscard]] double costNs() const noexcept { return isGood() ? bench::costNs(figures) : 0; }
   [[nodiscard]] bool hasFloorMoved() const noexcept { return floorDrift > kLargeDrift; }
-  [[nodiscard]] bool haveLinesMoved() const noexcept { return lineDrift > kLargeLineDrift; }
   [[nodiscard]] bool hadLessCpu() const noexcept { return disturbance.isLarge(measurement.mode); }
   // Whether this row is noise; see README.md, "Rows that were disturbed".
   [[nodiscard]] bool isDisturbed() const noexcept {
-    return isGood() && (hadLessCpu() || hasFloorMoved() || haveLinesMoved());
+    return isGood() && (hadLessCpu() || hasFloorMoved() || haveLinesMoved);
   }
 
   static constexpr double kLargeDrift = 1.25;

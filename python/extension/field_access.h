@@ -169,7 +169,7 @@ void addFields(Class& type) {
   std::apply([&](const auto&... field) { (add(field), ...); }, T::fields());
 }
 
-// "Int32(value=3, cmd=1)", as an expression that makes the message: fields that are 0 are omitted.
+// "Int32(value=3, cmd=1)": fields that are 0 are omitted.
 //   value  the text for the value, or empty
 template <class T>
 std::string describe(const char* className, const T& fields, const std::string& value) {

@@ -108,6 +108,7 @@ TEST(Table, MarksRowsThatWereDisturbed) {
   moved.floorDrift = 2;
   auto far = disturbed(0.01);
   far.lineDrift = 4;
+  far.haveLinesMoved = true;
 
   EXPECT_THAT(table({disturbed(0.25)}), HasSubstr("disturbed: others took 25 % of the CPUs"));
   EXPECT_THAT(table({moved}), HasSubstr("disturbed: floor moved x 2.00"));

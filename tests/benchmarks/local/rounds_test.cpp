@@ -42,7 +42,7 @@ TEST(Rounds, OnlyCalmRoundsCount) {
   EXPECT_DOUBLE_EQ(result.costNs(), 150);
   EXPECT_EQ(result.figures.latency.count(), 1u);
   EXPECT_DOUBLE_EQ(result.disturbance.share(), 0) << "only that of the round that counts";
-  EXPECT_FALSE(result.haveLinesMoved());
+  EXPECT_FALSE(result.haveLinesMoved);
 }
 
 TEST(Rounds, ThoseWithTheSameLinesCount) {
@@ -88,7 +88,7 @@ TEST(Rounds, AllCountIfNoneWasCalm) {
 
   EXPECT_EQ(result.rounds, 2u);
   EXPECT_DOUBLE_EQ(result.lineDrift, 4);
-  EXPECT_TRUE(result.haveLinesMoved() && result.isDisturbed());
+  EXPECT_TRUE(result.haveLinesMoved && result.isDisturbed());
 }
 
 TEST(Rounds, ARowWithOtherLinesThanItsBlockIsDisturbed) {
@@ -97,6 +97,14 @@ TEST(Rounds, ARowWithOtherLinesThanItsBlockIsDisturbed) {
 
   EXPECT_EQ(result.rounds, 1u);
   EXPECT_DOUBLE_EQ(result.lineDrift, 4);
+  EXPECT_TRUE(result.isDisturbed());
+}
+
+TEST(Rounds, ARoundWhoseFloorFailedIsNotDividedByIt) {
+  auto failed = costing(150, 100, 100);
+  failed.floorBeforeNs = 0;
+
+  EXPECT_DOUBLE_EQ(resultOf({failed, costing(150, 100, 100)}).ratioToFloor, 1.5);
 }
 
 TEST(Rounds, AllCountIfLinesWereNotTimed) {

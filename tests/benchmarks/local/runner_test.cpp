@@ -83,7 +83,7 @@ TEST(Runner, EndsWhenCacheLinesMoveInEachRound) {
   const auto times = timesMeasured({100, 400, 100}, result);
 
   EXPECT_EQ(times, 3 * Runner::kMostTimes);
-  EXPECT_TRUE(result.haveLinesMoved());
+  EXPECT_TRUE(result.haveLinesMoved);
   EXPECT_EQ(result.rounds, static_cast<std::size_t>(times));
 }
 
