@@ -70,6 +70,10 @@ TEST_F(RingTest, KnowsWhetherTheOwnerWasIdleBeforeTheMessage) {
   EXPECT_TRUE(consumer_.wasIdle());
   take();
   EXPECT_FALSE(consumer_.wasIdle());
+  consumer_.onEmpty();
+  ASSERT_TRUE(push(3));
+  take();
+  EXPECT_TRUE(consumer_.wasIdle());
 }
 
 TEST_F(RingTest, TheProducerLooksWhereItsConsumerPolls) {
