@@ -104,7 +104,7 @@ class DevMpf::Impl final : public SharedClient::Member,
   }
 
   // --- any thread
-  void deliver(Message&& message) override {
+  void deliver(Message&& message) noexcept override {
     if (queue_.push(std::move(message))) callbacks_.add(*this);
   }
   void tick(std::int64_t nowNs) override {
@@ -128,19 +128,15 @@ class DevMpf::Impl final : public SharedClient::Member,
   }
 
   // --- with the record locked
-  long process() {
+  // Record support, which calls it, is C: no exception may leave.
+  long process() noexcept {
     hasProcessed_ = true;
-    if (reply_) {
-      auto reply = std::move(*reply_);
-      reply_.reset();
-      if (const auto* fate = reply.tryAs<RequestFate>()) return failFate(fate->fate);
-      return device_.completeIO(record_, std::move(reply));
+    try {
+      return reply_ ? completeIO() : startIO();
+    } catch (const std::exception& error) {
+      isDelayOver_ = false;
+      return device_.fail(record_, error.what());
     }
-    isDelayOver_ = record_->pact;
-    const auto status = start();
-    isDelayOver_ = false;
-    if (record_->nsev == INVALID_ALARM && !hasMessageTime_) stampNow();
-    return status;
   }
   long send(Message&& message, ReplyType reply) {
     if (reply == replyTypeCompleteIO && isDelayOver_)
@@ -186,18 +182,34 @@ class DevMpf::Impl final : public SharedClient::Member,
   // NOLINTEND(readability-identifier-naming)
 
  private:
-  long start() {
+  long completeIO() {
+    auto reply = std::move(*reply_);
+    reply_.reset();
+    if (const auto* fate = reply.tryAs<RequestFate>()) return failFate(fate->fate);
+    return device_.completeIO(record_, std::move(reply));
+  }
+  long startIO() {
+    isDelayOver_ = record_->pact;
+    const auto status = startIfConnected();
+    isDelayOver_ = false;
+    if (record_->nsev == INVALID_ALARM && !hasMessageTime_) stampNow();
+    return status;
+  }
+  long startIfConnected() {
     if (!connection_ || !connection_->isConnected()) return failDisconnected();
     if (connection_->isServerStopped()) return failComm("server is stopped");
     return device_.startIO(record_);
   }
-  void handle(Message&& message) {
+  void handle(Message&& message) try {
     if (const auto* connect = message.tryAs<Connect>()) return device_.connectIO(record_, *connect);
     if (!message) return onServerStopped();
     stamp(timeStampOf(message.getTimeStampNs()));
     hasMessageTime_ = true;
     dispatch(std::move(message));
     hasMessageTime_ = false;
+  } catch (const std::exception& error) {
+    hasMessageTime_ = false;
+    errlogPrintf("%s: %s\n", record_->name, error.what());
   }
   // The server was stopped, or runs again: start() sets the alarm, or gets the value.
   void onServerStopped() {
@@ -324,7 +336,7 @@ long DevMpf::fail(dbCommon* record, const char* reason) {
 }
 
 long DevMpf::readWrite(dbCommon* record) {
-  auto* device = static_cast<DevMpf*>(record->dpvt);
+  auto* const device = static_cast<DevMpf*>(record->dpvt);
   if (device == nullptr) {
     recGblSetSevrMsg(record, SOFT_ALARM, INVALID_ALARM, "no device support");
     return S_dev_noDevSup;
@@ -342,7 +354,13 @@ long DevMpf::getIoIntInfo(int, dbCommon* record, IOSCANPVT* scan) {
 
 long DevMpf::linearConvert(dbCommon* record, int pass) {
   auto* device = static_cast<DevMpf*>(record->dpvt);
-  return device == nullptr ? S_dev_noDevSup : device->convert(record, pass);
+  if (device == nullptr) return S_dev_noDevSup;
+  try {
+    return device->convert(record, pass);
+  } catch (const std::exception& error) {
+    errlogPrintf("%s: %s\n", record->name, error.what());
+    return S_db_badField;
+  }
 }
 
 }  // namespace mpf

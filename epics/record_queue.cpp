@@ -2,7 +2,10 @@
 #include "epics/record_queue.h"
 
 #include <algorithm>
+#include <new>
 #include <utility>
+
+#include "epics/shared_client.h"
 
 namespace mpf {
 namespace {
@@ -12,13 +15,31 @@ bool isFurtherReply(const Message& message) noexcept {
   return !endsRequest(message) && message.getType() != MessageType::connect;
 }
 
+// A record has at most one such request.
+bool completesIO(const Message& message) noexcept {
+  return endsRequest(message) && SharedClient::replyTypeOf(message) == replyTypeCompleteIO;
+}
+
 }  // namespace
 
-bool RecordQueue::push(Message&& message) {
+bool RecordQueue::push(Message&& message) noexcept {
   const std::lock_guard lock(mutex_);
   if (messages_.size() >= kMaxMessages && isFurtherReply(message)) dropOldest();
-  messages_.push_back(std::move(message));
+  keep(std::move(message));
   return !std::exchange(isInCallbackQueue_, true);
+}
+
+void RecordQueue::keep(Message&& message) noexcept try {
+  messages_.push_back(std::move(message));
+} catch (const std::bad_alloc&) {  // the message is unchanged
+  if (message.getType() == MessageType::connect) connect_ = std::move(message);
+  else if (completesIO(message)) end_ = std::move(message);
+  else ++overruns_;
+}
+
+Message* RecordQueue::reserved() noexcept {
+  if (end_) return &end_;
+  return connect_ ? &connect_ : nullptr;
 }
 
 void RecordQueue::dropOldest() {
@@ -33,18 +54,22 @@ std::deque<Message>::iterator RecordQueue::next(bool isRequestOutstanding) {
                               : messages_.begin();
 }
 
-bool RecordQueue::tryTake(Message& message, bool isRequestOutstanding) {
+bool RecordQueue::tryTake(Message& message, bool isRequestOutstanding) noexcept {
   const std::lock_guard lock(mutex_);
-  const auto at = next(isRequestOutstanding);
-  if (at == messages_.end()) return false;
-  message = std::move(*at);
-  messages_.erase(at);
+  if (const auto at = next(isRequestOutstanding); at != messages_.end()) {
+    message = std::move(*at);
+    messages_.erase(at);
+    return true;
+  }
+  auto* const last = reserved();
+  if (last == nullptr) return false;
+  message = std::exchange(*last, {});
   return true;
 }
 
-bool RecordQueue::finish(bool isRequestOutstanding) {
+bool RecordQueue::finish(bool isRequestOutstanding) noexcept {
   const std::lock_guard lock(mutex_);
-  isInCallbackQueue_ = next(isRequestOutstanding) != messages_.end();
+  isInCallbackQueue_ = next(isRequestOutstanding) != messages_.end() || reserved() != nullptr;
   return isInCallbackQueue_;
 }
 

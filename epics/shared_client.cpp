@@ -72,24 +72,17 @@ void SharedClient::cancel(std::uint32_t requestId) {
 
 void SharedClient::serveBacklog() {
   if (!hasBacklog_.load(std::memory_order_relaxed)) return;
-  std::vector<Message> fates;
-  {
-    const std::lock_guard lock(mutex_);
-    if (nextDeadline_.hasPassed()) endExpired(fates);
-    while (!backlog_.empty() && trySendFirst(fates)) backlog_.pop_front();
-    hasBacklog_.store(!backlog_.empty(), std::memory_order_relaxed);
-  }
-  for (auto& fate : fates) {
-    const auto clientType = fate.getClientType();
-    deliver(clientType, std::move(fate));
-  }
+  const std::lock_guard lock(mutex_);
+  if (nextDeadline_.hasPassed()) endExpired();
+  while (!backlog_.empty() && trySendFirst()) backlog_.pop_front();
+  hasBacklog_.store(!backlog_.empty(), std::memory_order_relaxed);
 }
 
-void SharedClient::endExpired(std::vector<Message>& fates) {
+void SharedClient::endExpired() {
   nextDeadline_ = Deadline::never();
   std::erase_if(backlog_, [&](const Waiting& waiting) {
     if (waiting.deadline.hasPassed()) {
-      fates.push_back(fateOf(waiting.message, Fate::expired));
+      deliverLocked(fateOf(waiting.message, Fate::expired));
       return true;
     }
     nextDeadline_ = std::min(nextDeadline_, waiting.deadline);
@@ -98,7 +91,7 @@ void SharedClient::endExpired(std::vector<Message>& fates) {
 }
 
 // Returns false when the queue of the server is full.
-bool SharedClient::trySendFirst(std::vector<Message>& fates) {
+bool SharedClient::trySendFirst() {
   auto& waiting = backlog_.front();
   const auto clientType = waiting.message.getClientType();
   std::uint32_t id = 0;
@@ -110,20 +103,16 @@ bool SharedClient::trySendFirst(std::vector<Message>& fates) {
   } else {
     waiting.message.setClientType(clientType);
     const bool isConnected = result != SendResult::notConnected;
-    fates.push_back(fateOf(waiting.message, isConnected ? Fate::refused : Fate::neverTaken));
+    deliverLocked(fateOf(waiting.message, isConnected ? Fate::refused : Fate::neverTaken));
   }
   return true;
 }
 
 void SharedClient::endBacklog(Fate fate) {
-  std::deque<Waiting> ended;
-  {
-    const std::lock_guard lock(mutex_);
-    ended.swap(backlog_);
-    hasBacklog_.store(false, std::memory_order_relaxed);
-  }
-  for (auto& waiting : ended)
-    deliver(waiting.message.getClientType(), fateOf(waiting.message, fate));
+  const std::lock_guard lock(mutex_);
+  for (const auto& waiting : backlog_) deliverLocked(fateOf(waiting.message, fate));
+  backlog_.clear();
+  hasBacklog_.store(false, std::memory_order_relaxed);
 }
 
 void SharedClient::close() {
@@ -139,8 +128,10 @@ void SharedClient::close() {
 void SharedClient::onMessage(Message&& message) {
   if (const auto* connect = message.tryAs<Connect>()) return onConnect(*connect);
   if (message.getType() != MessageType::requestFate) setServerStopped(false);  // it has sent this
-  const auto clientType = message.getClientType();
-  deliver(clientType, std::move(message));
+  {
+    const std::lock_guard lock(mutex_);
+    deliverLocked(std::move(message));
+  }
   serveBacklog();
 }
 
@@ -161,14 +152,9 @@ void SharedClient::setServerStopped(bool isStopped) {
   for (auto* member : members_) member->deliver(Message());
 }
 
-void SharedClient::deliver(std::int32_t clientType, Message&& message) {
-  const auto number = static_cast<std::uint32_t>(clientType) >> 2;
-  Member* member = nullptr;
-  {
-    const std::lock_guard lock(mutex_);
-    if (number < members_.size()) member = members_[number];
-  }
-  if (member != nullptr) member->deliver(std::move(message));
+void SharedClient::deliverLocked(Message&& message) noexcept {
+  const auto number = static_cast<std::uint32_t>(message.getClientType()) >> 2;
+  if (number < members_.size()) members_[number]->deliver(std::move(message));
 }
 
 bool SharedClient::isConnected() const {

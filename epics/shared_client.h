@@ -32,7 +32,7 @@ class SharedClient {
   class Member {
    public:
     // An empty message: isServerStopped() has changed.
-    virtual void deliver(Message&& message) = 0;
+    virtual void deliver(Message&& message) noexcept = 0;
 
    protected:
     ~Member() = default;
@@ -88,10 +88,11 @@ class SharedClient {
   };
   void onMessage(Message&& message);
   void onConnect(const Connect& connect);
-  void endExpired(std::vector<Message>& fates);
-  bool trySendFirst(std::vector<Message>& fates);
+  void endExpired();
+  bool trySendFirst();
   void endBacklog(Fate fate);
-  void deliver(std::int32_t clientType, Message&& message);
+  // To the member that the message is for. The caller holds the mutex.
+  void deliverLocked(Message&& message) noexcept;
 
   const std::string server_;
   const std::int32_t location_;

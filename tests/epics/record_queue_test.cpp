@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <mpf/epics/dev_mpf.h>
+
+#include "tests/support/limited_memory.h"
+
 namespace mpf::test {
 namespace {
 
@@ -61,6 +65,42 @@ TEST_F(RecordQueueTest, NeverDropsTheEndOfARequest) {
 
   for (std::int32_t value = 0; value < 1000; ++value) EXPECT_EQ(take(), value);
   EXPECT_EQ(queue_.overruns(), 0U);
+}
+
+// Pushes further replies until one has no memory, and returns the number of those that are kept.
+int fillMemory(RecordQueue& queue) {
+  int kept = 0;
+  for (auto overruns = queue.overruns(); queue.overruns() == overruns; ++kept)
+    static_cast<void>(queue.push(reply(kept, false)));
+  return kept - 1;
+}
+
+TEST_F(RecordQueueTest, WithoutMemoryKeepsTheEndOfTheIOAndTheLastConnect) {
+  auto end = reply(1000, true);
+  end.setClientType(replyTypeCompleteIO);
+  auto other = reply(2000, true);
+  other.setClientType(replyTypeReceiveReply);
+  int kept = 0;
+  {
+    const LimitedMemory limit(0);
+    kept = fillMemory(queue_);
+    static_cast<void>(queue_.push(ConnectMessage({.status = ConnectStatus::connectNo})));
+    static_cast<void>(queue_.push(std::move(end)));
+    static_cast<void>(queue_.push(std::move(other)));
+    static_cast<void>(queue_.push(ConnectMessage({.status = ConnectStatus::connectYes})));
+  }
+
+  EXPECT_LT(kept, static_cast<int>(RecordQueue::kMaxMessages)) << "memory was not the limit";
+  EXPECT_EQ(queue_.overruns(), 2u) << "a further reply, and the end of another request";
+  EXPECT_TRUE(queue_.finish(true));
+  EXPECT_EQ(take(true), 1000) << "the record is active";
+  for (int value = 0; value < kept; ++value) EXPECT_EQ(take(), value);
+  EXPECT_TRUE(queue_.finish(false));
+  Message connect;
+  ASSERT_TRUE(queue_.tryTake(connect, false));
+  ASSERT_NE(connect.tryAs<Connect>(), nullptr);
+  EXPECT_EQ(connect.tryAs<Connect>()->status, ConnectStatus::connectYes);
+  EXPECT_FALSE(queue_.finish(false));
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace {
 // Records what it gets; any thread.
 class RecordingMember final : public SharedClient::Member {
  public:
-  void deliver(Message&& message) override {
+  void deliver(Message&& message) noexcept override {
     const std::lock_guard lock(mutex_);
     messages_.push_back(std::move(message));
   }
