@@ -91,14 +91,19 @@ inline void setField(std::int32_t& field, nb::handle value, const Place& place) 
   int overflow = 0;
   const auto number = PyLong_AsLongLongAndOverflow(index.ptr(), &overflow);
   if (overflow != 0 || number != static_cast<std::int32_t>(number)) {
-    PyErr_Format(PyExc_OverflowError, "%s: %S is not a 32-bit integer", place.field, index.ptr());
+    PyErr_Format(PyExc_ValueError, "%s: %S is not a 32-bit integer", place.field, index.ptr());
     throw nb::python_error();
   }
   field = static_cast<std::int32_t>(number);
 }
 inline void setField(double& field, nb::handle value, const Place& place) {
   const auto number = PyFloat_AsDouble(value.ptr());
-  if (number == -1.0 && PyErr_Occurred() != nullptr) raiseNotConverted(place, "a float", value);
+  if (number == -1.0 && PyErr_Occurred() != nullptr) {
+    if (PyErr_ExceptionMatches(PyExc_OverflowError) == 0)
+      raiseNotConverted(place, "a float", value);
+    PyErr_Format(PyExc_ValueError, "%s: too large for a 64-bit float", place.field);
+    throw nb::python_error();
+  }
   field = number;
 }
 inline void setField(char& field, nb::handle value, const Place& place) {

@@ -236,8 +236,10 @@ def test_a_message_that_is_too_large_is_refused_with_the_limit() -> None:
 
 
 def test_invalid_arguments_are_named() -> None:
-    with pytest.raises(OverflowError, match="address: 4294967296"):
+    with pytest.raises(ValueError, match="address: 4294967296"):
         mpf.Int32(address=2**32)
+    with pytest.raises(ValueError, match="value: too large"):
+        mpf.Float64(10**400)
     with pytest.raises(ValueError, match="eom: 5 bytes"):
         mpf.Char8Array(eom=b"12345")
     with pytest.raises(ValueError, match="parity: 'Even'"):

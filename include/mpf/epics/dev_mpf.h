@@ -43,9 +43,9 @@
 // Errors   a record whose request has no reply gets an alarm with severity INVALID: TIMEOUT (no
 //          reply in time), COMM (no connection, connection lost, server stopped), READ or WRITE
 //          (the server refused the request, a queue is full, not a message of the expected type).
-//          AMSG has the reason. If startIO() or completeIO() throws a std::exception, that is a READ
-//          or WRITE alarm with its text; what another virtual function throws is logged, and
-//          convert() refuses the change.
+//          AMSG has the reason. A std::exception of startIO() or completeIO() is a READ or WRITE
+//          alarm with its text. One of another virtual function is logged; convert() then refuses
+//          the change.
 // Owner    the object belongs to the record; it lives until the IOC ends.
 // Source   manual, "MPF Device support", "EXAMPLE Implementation: ip330Scan".
 #pragma once
