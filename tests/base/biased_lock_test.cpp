@@ -101,7 +101,9 @@ TEST(BiasedLockTest, AnActionUnderTheBiasHoldsTheLock) {
   becomeOwner(lock);
   int count = 0;  // not atomic: the lock protects it
   int actions = 0;
-  std::thread other([&] {
+  std::atomic<bool> hasActed = false;
+  std::thread other([&] {  // its first entry disables the bias
+    while (!hasActed) std::this_thread::yield();
     for (int i = 0; i < kManyEntries; ++i) {
       const BiasedLock::Guard guard(lock);
       ++count;
@@ -111,9 +113,11 @@ TEST(BiasedLockTest, AnActionUnderTheBiasHoldsTheLock) {
     lock.ifBiased([&] {
       ++count;
       ++actions;
+      hasActed = true;
     });
   other.join();
 
+  EXPECT_GT(actions, 0);
   EXPECT_EQ(count, kManyEntries + actions);
 }
 
