@@ -316,11 +316,11 @@ inline void RequestSender::setTimers(bool startsNudging, std::int64_t deadlineNs
   if (deadlineNs != 0) timer_.wakeAt(deadlineNs);
 }
 
-bool RequestSender::tryKeep(Request& request) {
+bool RequestSender::tryKeep(Request& request) noexcept {
   if (!request.copy || request.isGivenUp) return false;
   {
     const BiasedLock::Guard lock(*lock_);
-    untaken_.add(request);
+    if (!untaken_.tryAdd(request)) return false;
   }
   requests_->end(request);
   return true;

@@ -67,8 +67,8 @@ class RequestSender {
   [[nodiscard]] std::uint32_t findExpired(std::uint32_t& at, std::int64_t nowNs,
                                           std::int64_t& nextNs) noexcept;
   // Keeps a request that no server has taken, if it has a copy: the request ends in the table, and
-  // trySendUntaken() sends it. Returns false when it has none.
-  [[nodiscard]] bool tryKeep(Request& request);
+  // trySendUntaken() sends it. Returns false when it has none, or there is no memory.
+  [[nodiscard]] bool tryKeep(Request& request) noexcept;
   // Sends the first request that was kept; it is kept until the result is `sent`.
   [[nodiscard]] SendResult trySendUntaken();
   [[nodiscard]] const UntakenRequests& untaken() const noexcept { return untaken_; }

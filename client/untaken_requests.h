@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <list>
 #include <memory>
+#include <new>
 #include <optional>
 
 #include <mpf/message.h>
@@ -34,14 +35,17 @@ class UntakenRequests {
   [[nodiscard]] UntakenRequest& front() noexcept { return requests_.front(); }
   [[nodiscard]] const std::list<UntakenRequest>& all() const noexcept { return requests_; }
   // Takes the copy of a request of the table, which ends then without a fate. Requests may come in
-  // any order.
-  void add(Request& request) {
+  // any order. Returns false, with the request unchanged, if there is no memory.
+  [[nodiscard]] bool tryAdd(Request& request) noexcept try {
     const auto id = request.id.load(std::memory_order_relaxed);
     const auto isSentBefore = [id](const UntakenRequest& other) {
       return static_cast<std::int32_t>(other.id - id) < 0;  // ids begin again after the largest one
     };
-    requests_.insert(std::ranges::find_if_not(requests_, isSentBefore),
-                     {id, request.deadlineNs, std::move(request.copy)});
+    const auto added = requests_.emplace(std::ranges::find_if_not(requests_, isSentBefore));
+    *added = {id, request.deadlineNs, std::move(request.copy)};
+    return true;
+  } catch (const std::bad_alloc&) {
+    return false;
   }
   void removeFront() noexcept { requests_.pop_front(); }
   // Removes and returns the first request for which `isWanted` is true.

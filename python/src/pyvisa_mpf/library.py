@@ -97,7 +97,7 @@ class MpfVisaLibrary(VisaLibraryBase):
         return self._return(session, StatusCode.success)
 
     def flush(self, session: Any, mask: constants.BufferOperation) -> StatusCode:
-        self._do(session, Session.clear)
+        self._do(session, lambda opened: opened.flush(mask))
         return self._return(session, StatusCode.success)
 
     def read_stb(self, session: Any) -> tuple[int, StatusCode]:

@@ -24,6 +24,15 @@ _STATUS = {
 }
 _PARITY = {constants.Parity.none: "N", constants.Parity.odd: "O", constants.Parity.even: "E"}
 _STOP_BITS = {constants.StopBits.one: 1, constants.StopBits.two: 2}
+_DISCARD_RECEIVED = (
+    constants.BufferOperation.discard_receive_buffer
+    | constants.BufferOperation.discard_receive_buffer2
+)
+_DISCARD_READ = (
+    constants.BufferOperation.discard_read_buffer
+    | constants.BufferOperation.discard_read_buffer_no_io
+    | _DISCARD_RECEIVED
+)
 _FLOW = {constants.ControlFlow.none: "N", constants.ControlFlow.rts_cts: "H"}
 
 
@@ -35,6 +44,8 @@ def status_of(error: Exception) -> StatusCode:
         return StatusCode.error_connection_lost
     if isinstance(error, TimeoutError):
         return StatusCode.error_timeout
+    if isinstance(error, KeyError):  # a setting that serial servers do not have
+        return StatusCode.error_nonsupported_attribute_state
     return StatusCode.error_io
 
 
@@ -108,6 +119,13 @@ class Session:
         if isinstance(self.instrument, mpf.Gpib):
             self.instrument.clear(self._timeout())
         else:
+            self.instrument.flush()
+
+    def flush(self, mask: int) -> None:
+        """Discards received bytes, if the mask says so: nothing is buffered for sending."""
+        if mask & _DISCARD_READ:
+            self._unread = b""
+        if mask & _DISCARD_RECEIVED and isinstance(self.instrument, mpf.Serial):
             self.instrument.flush()
 
     def read_stb(self) -> int:

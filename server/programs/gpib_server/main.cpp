@@ -33,12 +33,12 @@ int serve(int argc, char** argv) {
   const auto backplane = mpf::Backplane::attach(arguments.backplane);
   mpf::MessageServer server(backplane, options.server, arguments.messages);
   mpf::logShortages(server, *log);
+  mpf::ProgramFailure failure;  // destroyed after the servers, whose threads use it
   mpf::GpibServer served(server, *bus, options.limits, log);
   mpf::SniffServer sniff(backplane, options.server, arguments.messages, mpf::sniffSourceOf(*bus),
                          log, kSniffBatching);
   log->info(R"(serving {} as "{}" at location {}; listeners: "{}")", bus->description(),
             server.getName(), server.location(), sniff.getName());
-  mpf::ProgramFailure failure;
   served.start([&] { failure.report(); });
   sniff.start([&] { failure.report(); });
   stop.wait();

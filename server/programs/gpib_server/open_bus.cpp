@@ -17,7 +17,7 @@ constexpr std::chrono::milliseconds kRetryEvery{500};
 
 std::unique_ptr<GpibBus> openBus(GpibStartOptions& options, const ServerLog& log, StopBell& stop) {
   if (const auto* const start = options.ti9914.find(options.module)) {
-    auto controller = openTi9914(options.ti9914, *start, options.hardware, log);
+    auto controller = openTi9914(options.ti9914, *start, options.hardware, log, stop);
     return controller ? std::make_unique<GpibBus>(std::move(controller)) : nullptr;
   }
   for (std::string logged;;) {

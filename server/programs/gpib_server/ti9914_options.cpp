@@ -75,9 +75,10 @@ const Ti9914Start* Ti9914Options::find(const std::string& module) const {
 }
 
 std::unique_ptr<GpibController> openTi9914(const Ti9914Options& options, const Ti9914Start& start,
-                                           Hardware& hardware, const ServerLog& log) {
+                                           Hardware& hardware, const ServerLog& log,
+                                           StopBell& stop) {
   auto* const module = hardware.open(
-      start.place, kIp488, [&] { return makeModel(options, start, hardware, log); }, log);
+      start.place, kIp488, [&] { return makeModel(options, start, hardware, log); }, log, stop);
   if (module == nullptr) return nullptr;
   if (start.vector) hardware.modules().takeVector(*start.vector, *module);
   hardware.logPriority(log);

@@ -40,14 +40,14 @@ struct Ti9914Options {
 };
 
 // Opens `start`, one of options.modules. On a model carrier, each module has a bus of its own
-// with all meters. With --wait it waits for the module, and returns null when SIGINT or SIGTERM
-// arrived meanwhile.
+// with all meters. With --wait it waits for the module, and returns null when `stop` has rung.
 //   log      outlives the controller, which logs faults of its interrupts
 //   throws  as Hardware::open(), IndustryPackModules::takeVector() and Ti9914Controller;
 //           std::invalid_argument when two meters have the same address, or a meter has a wire and
 //           there is no --wires
 [[nodiscard]] std::unique_ptr<GpibController> openTi9914(const Ti9914Options& options,
                                                          const Ti9914Start& start,
-                                                         Hardware& hardware, const ServerLog& log);
+                                                         Hardware& hardware, const ServerLog& log,
+                                                         StopBell& stop);
 
 }  // namespace mpf

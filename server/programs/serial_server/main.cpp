@@ -35,13 +35,14 @@ int serve(int argc, char** argv) {
   for (const auto& start : options.servers)
     served.push_back(
         std::make_unique<mpf::ServedPort>(backplane, options, start, ports.find(start.port)));
+  for (const auto& server : served) server->start([&] { failure.report(); });
+  // Last: `ports` outlives the servers, also if the start of one throws.
   ports.onAlarm([&](const std::string& module) {
     for (const auto& server : served) {
       const auto* const port = options.octal.find(server->portName());
       if (port != nullptr && port->module == module) server->countAlarm();
     }
   });
-  for (const auto& server : served) server->start([&] { failure.report(); });
   stop.wait();
   for (const auto& server : served) server->stop();
   for (const auto& server : served) server->join();
