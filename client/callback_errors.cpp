@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "client/callback_errors.h"
 
-#include <cstdio>
 #include <exception>
 #include <fmt/format.h>
 #include <utility>
 
 #include <mpf/clock.h>
+
+#include "base/print_error.h"
 
 namespace mpf {
 namespace {
@@ -53,10 +54,7 @@ void CallbackErrors::writeHeld() noexcept try {
 }
 
 void CallbackErrors::write(const std::vector<LogLimiter::Line>& lines) {
-  for (const auto& line : lines) {
-    const auto text = line.text + '\n';
-    std::fwrite(text.data(), 1, text.size(), stderr);
-  }
+  for (const auto& line : lines) printError("{}\n", line.text);
 }
 
 }  // namespace mpf

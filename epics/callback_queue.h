@@ -20,7 +20,7 @@ class CallbackQueue {
     [[nodiscard]] virtual bool processOne() = 0;
 
    protected:
-    virtual ~Record() = default;
+    ~Record() = default;
 
    private:
     friend class CallbackQueue;

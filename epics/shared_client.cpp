@@ -47,6 +47,7 @@ void SharedClient::bind() {
 SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& message,
                               Deadline deadline, std::atomic<std::uint32_t>& requestId) {
   message.setClientType(static_cast<std::int32_t>(member << 2) | reply);
+  const auto bytes = message.body().size();
   const std::lock_guard lock(mutex_);
   if (!client_ || !client_->isConnected()) return SendResult::notConnected;
   if (backlog_.empty()) {
@@ -56,7 +57,7 @@ SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& m
     if (!isFull(result)) return result;
   }
   const auto mostBytes = client_->maxMessageBytes();  // 0: has been disconnected meanwhile
-  if (mostBytes != 0 && message.body().size() > mostBytes) return SendResult::tooLarge;
+  if (mostBytes != 0 && bytes > mostBytes) return SendResult::tooLarge;
   if (backlog_.size() >= kMaxBacklog) return SendResult::queueFull;
   // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
   backlog_.push_back({std::move(message), deadline, &requestId});

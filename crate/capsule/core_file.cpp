@@ -9,9 +9,11 @@
 #include <unistd.h>
 
 #include <array>
+#include <filesystem>
 #include <fmt/format.h>
 #include <functional>
 #include <glob.h>
+#include <span>
 
 #include <mpf/clock.h>
 #include <mpf/file_descriptor.h>
@@ -34,13 +36,28 @@ std::string firstLine(const std::string& file) {
   return text.substr(0, text.find('\n'));
 }
 
+// The text as a pattern of glob() that only this text matches.
+std::string literal(const std::string& text) {
+  std::string pattern;
+  for (const char letter : text) {
+    if (std::string_view("*?[\\").find(letter) != std::string_view::npos) pattern += '\\';
+    pattern += letter;
+  }
+  return pattern;
+}
+
 // The newest core of the process; empty: it has left no core.
 std::string findCore(const std::string& pattern, pid_t pid) {
   glob_t found{};
   std::string core;
+  std::filesystem::file_time_type newest{};
   if (::glob(pattern.c_str(), 0, nullptr, &found) == 0) {
-    for (std::size_t i = found.gl_pathc; i-- > 0 && core.empty();) {
-      if (pidOfCore(found.gl_pathv[i]) == pid) core = found.gl_pathv[i];
+    for (const std::string file : std::span(found.gl_pathv, found.gl_pathc)) {
+      std::error_code ignored;  // a file that has gone has the oldest time
+      const auto written = std::filesystem::last_write_time(file, ignored);
+      if (pidOfCore(file) != pid || (!core.empty() && written <= newest)) continue;
+      core = file;
+      newest = written;
     }
   }
   ::globfree(&found);
@@ -122,7 +139,7 @@ Tree inChild(const std::function<Tree()>& work, std::chrono::milliseconds limit)
 std::string corePathPattern(const std::string& corePattern, bool usesPid,
                             const DeadProcess& process) {
   if (corePattern.starts_with('|')) return {};
-  std::string path = corePattern.starts_with('/') ? "" : process.folder + '/';
+  std::string path = corePattern.starts_with('/') ? "" : literal(process.folder) + '/';
   bool hasPid = false;
   for (std::size_t i = 0; i < corePattern.size(); ++i) {
     if (corePattern[i] != '%') {

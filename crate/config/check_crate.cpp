@@ -23,7 +23,7 @@ bool isFileName(const std::string& name) {
 // What is wrong with the name of a variable of the environment; empty: nothing.
 std::string problemOfVariable(const std::string& name) {
   if (name.empty() || name.find('=') != std::string::npos)
-    return "a name must not be empty and must not contain \"=\"; write NAME = \"VALUE\"";
+    return R"(a name must not be empty and must not contain "="; write NAME = "VALUE")";
   if (name == "MPF_BACKPLANE")
     return "it is set by the crate; write backplane = \"NAME\" at the top of the file";
   if (name == "MPF_LOCATION")

@@ -75,7 +75,7 @@ void Service::startFailed(const std::string& why, std::int64_t nowNs) {
   plan(nowNs);
 }
 
-void Service::becameReady(std::int64_t /*nowNs*/) {
+void Service::becameReady() {
   if (state_ == ServiceState::starting) state_ = ServiceState::ready;
 }
 
@@ -89,7 +89,10 @@ void Service::ended(const ProcessEnd& end, std::int64_t nowNs) {
   } else if (isRestartRequested_) {
     ++restarts_;
     state_ = ServiceState::waiting;
-  } else if (state_ != ServiceState::stopping && !mayRestart(end)) {
+  } else if (state_ == ServiceState::stopping) {  // stalled, or not ready in time
+    if (plan_.restart == Restart::never) state_ = ServiceState::failed;
+    else plan(nowNs);
+  } else if (!mayRestart(end)) {
     const auto isOver = plan_.restart == Restart::never || end.hasExited(0);
     state_ = isOver ? ServiceState::stopped : ServiceState::failed;
   } else {

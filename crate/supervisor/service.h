@@ -54,7 +54,7 @@ class Service {
   void startFailed(const std::string& why, std::int64_t nowNs);
   // While it is starting: what it lacks to be ready; empty: nothing.
   void lacks(std::string missing) { missing_ = std::move(missing); }
-  void becameReady(std::int64_t nowNs);
+  void becameReady();
   void ended(const ProcessEnd& end, std::int64_t nowNs);
   // `isStalled`: messages wait for a server of the process, and it takes none.
   void looked(bool isStalled, std::int64_t nowNs);

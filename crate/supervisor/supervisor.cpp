@@ -106,10 +106,11 @@ void Supervisor::takeOver() {
   }
 }
 
+void Supervisor::killAll() {
+  for (const auto& member : members_) signal(*member, SIGKILL);
+}
+
 void Supervisor::beginShutdown() {
-  if (isShuttingDown_) {  // the second signal: at once
-    for (const auto& member : members_) signal(*member, SIGKILL);
-  }
   isShuttingDown_ = true;
   ServiceManager::notifyStopping();
 }
@@ -208,8 +209,10 @@ void Supervisor::handleSignals() {
         }
         break;
       default:
-        printError("mpf run: {}: stopping\n", signalName(*number));
-        beginShutdown();
+        printError("mpf run: {}: {}\n", signalName(*number),
+                   isShuttingDown_ ? "killing what has not ended" : "stopping");
+        if (isShuttingDown_) killAll();
+        else beginShutdown();
         break;
     }
   }
@@ -280,7 +283,7 @@ void Supervisor::look() {
     if (service.state() != ServiceState::starting) continue;
     service.lacks(whatIsMissing(*member));
     if (!service.missing().empty()) continue;
-    service.becameReady(now);
+    service.becameReady();
     log(service, fmt::format("ready, pid {}, {} after its start", service.pid(),
                              durationText(static_cast<double>(now - service.startedNs()))));
   }

@@ -60,6 +60,7 @@ class Supervisor {
   std::vector<std::string> apply(const std::vector<ProcessPlan>& plans);
   std::vector<std::string> reload();
   void beginShutdown();
+  void killAll();
   void act();
   void start(Member& member);
   void signal(Member& member, int number);

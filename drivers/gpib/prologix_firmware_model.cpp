@@ -20,6 +20,9 @@ constexpr int kHighestPrimary = 30;
 constexpr std::size_t kPlusSigns = 2;
 
 // Addresses in the form "22", "22 101".
+constexpr std::string_view kUnrecognized = "Unrecognized command";
+
+// Empty if the first word is no primary address.
 std::vector<GpibAddress> addressesIn(const std::vector<int>& words) {
   std::vector<GpibAddress> addresses;
   for (const int word : words) {
@@ -85,7 +88,7 @@ void PrologixFirmwareModel::executeCommand(std::string_view text) {
     return;
   }
   const auto known = command(name);
-  if (known == nullptr) return answer("Unrecognized command");
+  if (known == nullptr) return answer(kUnrecognized);
   (this->*known)(words);
 }
 
@@ -169,7 +172,9 @@ void PrologixFirmwareModel::answer(std::string_view text) {
 
 void PrologixFirmwareModel::address(const Words& words) {
   if (words.empty()) return answer(prologix::addressText(address_));
-  address_ = addressesIn(words).front();
+  const auto addresses = addressesIn(words);
+  if (addresses.empty()) return answer(kUnrecognized);
+  address_ = addresses.front();
 }
 
 void PrologixFirmwareModel::clear(const Words& /*words*/) {
@@ -187,7 +192,9 @@ void PrologixFirmwareModel::lockOut(const Words& /*words*/) {
 }
 
 void PrologixFirmwareModel::poll(const Words& words) {
-  auto* const instrument = at(words.empty() ? address_ : addressesIn(words).front());
+  const auto addresses = words.empty() ? std::vector{address_} : addressesIn(words);
+  if (addresses.empty()) return answer(kUnrecognized);
+  auto* const instrument = at(addresses.front());
   if (instrument != nullptr) return answer(std::to_string(instrument->serialPoll()));
   const auto giveUp = Deadline::after(std::chrono::milliseconds(readTimeoutMs_));
   while (!giveUp.hasPassed() && surroundings_.pause(kLookEvery)) continue;

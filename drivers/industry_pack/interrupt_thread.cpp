@@ -90,8 +90,10 @@ void InterruptThread::serveInterrupt() {
 void InterruptThread::servePoll() {
   if (handler_(Cause::poll)) {
     late_.fetch_add(1, std::memory_order_relaxed);
-    if (!isPaused() && lateInRow_ < options_.lateLimit && ++lateInRow_ == options_.lateLimit)
-      report(InterruptFault::dead);
+    if (!isPaused() && lateInRow_ < options_.lateLimit) {
+      ++lateInRow_;
+      if (lateInRow_ == options_.lateLimit) report(InterruptFault::dead);
+    }
   }
   const auto period =
       isPaused() && options_.pollEvery.count() == 0 ? kPollWhilePaused : options_.pollEvery;

@@ -45,6 +45,7 @@ std::string programPath(const std::string& name) {
   ::signal(SIGPIPE, SIG_DFL);
   const int input = ::open("/dev/null", O_RDONLY);
   ::dup2(input, STDIN_FILENO);
+  if (input > STDERR_FILENO) ::close(input);
   if (output >= 0) ::dup2(output, STDOUT_FILENO);
   ::execvp(arguments[0], arguments);
   constexpr int kNotFound = 127;

@@ -39,7 +39,7 @@ TEST_F(RealTimePriorityTest, AppliesOnlyToTheThreadItself) {
   EXPECT_EQ(policyOfThisThread(), SCHED_OTHER);
 }
 
-TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadUnchanged) {
+TEST(RealTimePriority, ZeroNeedsNoPermissionAndChangesNothing) {
   std::thread([] {
     RealTimePriority priority(0);
     priority.check();

@@ -62,6 +62,8 @@ TEST(ServiceManager, ReportsEachState) {
   EXPECT_EQ(systemd.receive(), "STATUS=2 of 3");
   ServiceManager::notifyAlive();
   EXPECT_EQ(systemd.receive(), "WATCHDOG=1");
+  ServiceManager::notifyStillStopping();
+  EXPECT_EQ(systemd.receive(), "EXTEND_TIMEOUT_USEC=30000000");
 }
 
 TEST(ServiceManager, KnowsTheWatchdogOfItsProcess) {

@@ -9,6 +9,7 @@
 
 #include <mpf/message_server.h>
 
+#include "client/untaken_requests.h"
 #include "shm/segment_name.h"
 #include "shm/watcher.h"
 #include "tests/client/binding_parts_fixture.h"
@@ -68,6 +69,21 @@ TEST_F(NoMemoryTest, AClientThatCouldNotBeBoundMayBeBoundAgain) {
   }
 
   EXPECT_EQ(backplane_.segmentNames().size(), 6u) << "two windows with their hints and FIFOs";
+}
+
+TEST_F(NoMemoryTest, ARequestThatCannotBeKeptKeepsItsCopy) {
+  UntakenRequests kept;
+  Request request;
+  request.id = 1;
+  request.copy = std::make_unique<Message>(Int32Message({.value = 7}));
+  {
+    const LimitedMemory limit(0);
+    EXPECT_FALSE(kept.tryAdd(request));
+  }
+
+  EXPECT_TRUE(kept.isEmpty());
+  ASSERT_NE(request.copy, nullptr);
+  EXPECT_EQ(request.copy->tryAs<Int32>()->value, 7);
 }
 
 TEST_F(NoMemoryTest, AClientIsDestroyedWithoutMemory) {

@@ -14,7 +14,7 @@ void add(UntakenRequests& requests, std::uint32_t id, std::int64_t deadlineNs = 
   request.id = id;
   request.deadlineNs = deadlineNs;
   request.copy = std::make_unique<Message>(Int32Message({.value = static_cast<int>(id)}));
-  requests.add(request);
+  EXPECT_TRUE(requests.tryAdd(request));
   EXPECT_EQ(request.copy, nullptr);
 }
 

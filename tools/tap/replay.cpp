@@ -50,7 +50,8 @@ class Replayer {
 
   int run() {
     send();
-    if (requests_ == 0 && problem_.empty()) problem_ = arguments_.file + ": no request in it";
+    if (requests_ == 0 && problem_.empty() && !stopped_)
+      problem_ = arguments_.file + ": no request in it";
     awaitRest();
     report();
     return problem_.empty() && replied_ == requests_ ? 0 : 1;
@@ -98,7 +99,9 @@ class Replayer {
     client =
         std::make_unique<MessageClient>(dispatcher_, [this](Message&& message) { count(message); });
     client->bind(server_, arguments_.location);
-    if (client->connectWait(arguments_.timeout)) return client.get();
+    const auto limit = Deadline::after(arguments_.timeout);
+    while (!client->isConnected() && !stopped_ && !limit.hasPassed()) dispatcher_.runOnce(limit);
+    if (client->isConnected()) return client.get();
     problem_ = client->notConnectedBecause() + "; `mpf ls` shows all servers";
     return nullptr;
   }
@@ -176,11 +179,11 @@ class Replayer {
                                   {"late_max_ns", late_->maxNs()}};
       return fmt::print("{}\n", jsonText(report));
     }
-    if (requests_ == 0) return;  // problem_ has been printed
+    if (requests_ == 0) return;  // stopped, or problem_ has been printed
     fmt::print("{} of {} to \"{}\": {} replied", counted(requests_, "request"),
                counted(clients_.size(), "client"), server_, replied_);
     for (const auto& [end, times] : ends_) fmt::print(", {} {}", times, end);
-    if (arguments_.speed > 0 && requests_ != 0) {
+    if (arguments_.speed > 0) {
       fmt::print("; sent late by p50 {}, max {}",
                  durationText(static_cast<double>(late_->percentileNs(50))),
                  durationText(static_cast<double>(late_->maxNs())));

@@ -81,8 +81,8 @@ std::string converted(const std::string& format, std::size_t& at, const Command&
   std::array<char, 512> buffer{};
   const auto print = [&](const std::string& form, auto number) {
     const int length = std::snprintf(buffer.data(), buffer.size(), form.c_str(), number);
-    return std::string(buffer.data(), std::clamp<std::size_t>(static_cast<std::size_t>(length), 0,
-                                                              buffer.size() - 1));
+    return std::string(buffer.data(),
+                       std::min(static_cast<std::size_t>(length), buffer.size() - 1));
   };
   if (type == 's') return textOf(command, index++);
   if (std::string_view("diuxXoc").find(type) != std::string_view::npos && type != '\0') {

@@ -199,8 +199,8 @@ class Server(_mpf.BaseServer):
             while self._runner is not None and self._runner.is_alive():
                 self._interrupt()  # it may have begun to run once more
                 self._state.wait(1)
-        if self._thread is not None:
-            self._thread.join()
+        if (thread := self._thread) is not None:
+            thread.join()
             self._thread = None
         self._close()
 

@@ -25,6 +25,11 @@ TEST(CorePathPattern, HasThePidAndAsterisksForWhatIsNotKnown) {
   EXPECT_EQ(pathFor("/c/core%"), "/c/core");
 }
 
+TEST(CorePathPattern, MatchesOnlyTheFolderOfTheProcess) {
+  EXPECT_EQ(corePathPattern("core", false, {.pid = 77, .folder = "/run/[x]*?"}),
+            "/run/\\[x]\\*\\?/core");
+}
+
 TEST(CorePathPattern, IsEmptyWhenAProgramReceivesTheCores) {
   EXPECT_EQ(pathFor("|/usr/lib/systemd/systemd-coredump %P"), "");
 }

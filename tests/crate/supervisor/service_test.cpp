@@ -38,7 +38,7 @@ class ServiceTest : public testing::Test {
   }
   void becomeReady() {
     start();
-    service_.becameReady(now_);
+    service_.becameReady();
   }
   void end(const ProcessEnd& end) { service_.ended(end, now_); }
 
@@ -54,7 +54,7 @@ TEST_F(ServiceTest, StartsWhenItsNeedsAreReady) {
 
   service_.started(100, 7, now_);
   EXPECT_EQ(service_.state(), ServiceState::starting);
-  service_.becameReady(now_);
+  service_.becameReady();
   EXPECT_EQ(service_.state(), ServiceState::ready);
   EXPECT_EQ(action(), Action::none);
   EXPECT_EQ(service_.nextActionNs(), std::nullopt);
@@ -64,7 +64,7 @@ TEST_F(ServiceTest, StartsWhenItsNeedsAreReady) {
 TEST_F(ServiceTest, IsSettledWhenItIsReadyOrHasFailedOnce) {
   start();
   EXPECT_FALSE(service_.isSettled());
-  service_.becameReady(now_);
+  service_.becameReady();
   EXPECT_TRUE(service_.isSettled());
   service_.requestRestart(now_);
   EXPECT_FALSE(service_.isSettled());
@@ -243,6 +243,23 @@ TEST_F(ServiceTest, IsKilledWhenItIsStalledForTooLong) {
   EXPECT_THAT(service_.reason(), HasSubstr("stalled for 10"));
 }
 
+TEST_F(ServiceTest, IsNotRestartedAgainstThePolicyWhenItIsStalledOrNotReady) {
+  auto plan = planOf();
+  plan.restart = Restart::never;
+  for (const bool isReady : {false, true}) {
+    Service service(plan);
+    ASSERT_EQ(service.action(true, now_), Action::start);
+    service.started(1, 1, now_);
+    if (isReady) service.becameReady();
+    service.looked(isReady, now_);
+    pass(10s);
+    ASSERT_NE(service.action(true, now_), Action::none);
+    service.ended(killedBy(SIGKILL), now_);
+    EXPECT_EQ(service.state(), ServiceState::failed);
+    EXPECT_THAT(service.reason(), HasSubstr(isReady ? "stalled for 10" : "not ready within 5"));
+  }
+}
+
 TEST_F(ServiceTest, AStallThatEndsIsForgotten) {
   becomeReady();
   service_.looked(true, now_);
@@ -261,7 +278,7 @@ TEST_F(ServiceTest, WithoutALimitAStalledServerContinues) {
   Service service(plan);
   ASSERT_EQ(service.action(true, now_), Action::start);
   service.started(1, 1, now_);
-  service.becameReady(now_);
+  service.becameReady();
   service.looked(true, now_);
   pass(24h);
 

@@ -23,9 +23,13 @@ using testing::HasSubstr;
 
 class SupervisorEndTest : public SupervisorTest {
  protected:
-  // The entry of a program that runs this script.
-  static std::string program(const std::string& script) {
-    return "[[program]]\nname = \"shell\"\ncommand = [\"sh\", \"-c\", \"" + script + "\"]\n";
+  // The entry of a program that runs this script in the folder of the test.
+  std::string program(const std::string& script) {
+    return "[[program]]\nname = \"shell\"\ncommand = [\"sh\", \"-c\", \"" + script +
+           "\"]\nworking-folder = \"" + files_.path().string() + "\"\n";
+  }
+  void waitForFile(const std::string& name) {
+    while (::access(files_.file(name).c_str(), F_OK) != 0) continue;
   }
 };
 
@@ -57,9 +61,8 @@ class NotifiedSocket {
 };
 
 TEST_F(SupervisorEndTest, KillsWhatAProcessLeavesBehind) {
-  run(program("sleep 1000 & echo $! >left; mv left pid; exec sleep 1001") + "working-folder = \"" +
-      files_.path().string() + "\"\n");
-  while (::access(files_.file("pid").c_str(), F_OK) != 0) continue;
+  run(program("sleep 1000 & echo $! >left; mv left pid; exec sleep 1001"));
+  waitForFile("pid");
   const auto left = std::stoi(readWholeFile(files_.file("pid")));
   EXPECT_EQ(::kill(left, 0), 0);
 
@@ -74,13 +77,29 @@ TEST_F(SupervisorEndTest, PrintsALastLineWithoutAnEnd) {
   EXPECT_THAT(supervisor_->waitForLine("last words"), HasSubstr("shell | last words"));
 }
 
+// A user repeats `mpf stop` when a process takes long to end.
+TEST_F(SupervisorEndTest, ASecondRequestToStopKillsNothing) {
+  run(program("trap '' TERM; : >trapped; while [ ! -e go ]; do sleep 0.01; done; : >done"));
+  waitForFile("trapped");
+
+  ask({{"do", "shutdown"}});
+  ask({{"do", "shutdown"}});
+  waitForState("shell", "stopping");
+  static_cast<void>(files_.write("go", ""));
+
+  EXPECT_EQ(WEXITSTATUS(supervisor_->wait()), 0);
+  supervisor_.reset();
+  EXPECT_EQ(::access(files_.file("done").c_str(), F_OK), 0) << "the process was killed";
+}
+
 // The time that the processes may take to end is longer than systemd waits without such reports.
 TEST_F(SupervisorEndTest, TellsSystemdThatItStillStops) {
   const NotifiedSocket systemd;
   ::setenv("NOTIFY_SOCKET", systemd.name().c_str(), 1);
-  run(program("trap '' TERM; while :; do sleep 1000; done"));
+  run(program("trap '' TERM; : >trapped; while :; do sleep 1000; done"));
   ::unsetenv("NOTIFY_SOCKET");
   systemd.waitFor("READY=1");
+  waitForFile("trapped");
 
   supervisor_->signal(SIGTERM);
 

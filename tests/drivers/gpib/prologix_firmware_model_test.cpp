@@ -48,6 +48,8 @@ TEST_F(PrologixFirmwareModelTest, RemembersSettings) {
 TEST_F(PrologixFirmwareModelTest, RefusesUnknownCommands) {
   EXPECT_EQ(enter("++toast\n"), "Unrecognized command\r\n");
   EXPECT_EQ(enter("++ren 1\n"), "Unrecognized command\r\n");
+  EXPECT_EQ(enter("++addr 101\n++addr\n"), "Unrecognized command\r\n22\r\n");
+  EXPECT_EQ(enter("++spoll 101\n"), "Unrecognized command\r\n");
   firmware_.hasRemoteEnable = true;
   EXPECT_EQ(enter("++ren 0\n++ren\n"), "0\r\n");
 }

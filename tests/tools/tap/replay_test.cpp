@@ -178,6 +178,27 @@ TEST_F(ReplayTest, ARecordingWithoutARequestIsAnError) {
   EXPECT_EQ(ended.out, "");
 }
 
+TEST_F(ReplayTest, CtrlCEndsItWhileTheServerDoesNotAcceptIt) {
+  {
+    const EchoThread echo(backplane_, "echo");
+    SyncClient client(backplane_, "echo");
+    callMany(client, 0, 1);
+    const auto tool = tap({"--write", file_, "--count", "2"});
+    callMany(client, 0, 1);
+    EXPECT_EQ(tool->end().status, 0);
+  }
+  MessageServer server(backplane_, "echo");
+  Tool tool({"replay", file_, "--timeout", "100000"}, backplane_.name());
+  while (!server.waitForMessage()) continue;  // it asks for a connection
+
+  tool.signal(SIGINT);
+
+  const auto ended = tool.end();
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.err, HasSubstr("mpf replay: "));
+  EXPECT_THAT(ended.err, HasSubstr("\"echo\""));
+}
+
 TEST_F(ReplayTest, NamesAnAbsentServer) {
   {
     const EchoThread echo(backplane_, "echo");

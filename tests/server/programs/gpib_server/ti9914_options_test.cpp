@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/stop_bell.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/watchdog.h"
 
@@ -21,11 +22,12 @@ struct ParsedTi9914 {
     app.parse(line);
   }
   std::unique_ptr<GpibController> open(const std::string& module) {
-    return openTi9914(options, *options.find(module), hardware, log);
+    return openTi9914(options, *options.find(module), hardware, log, stop);
   }
   Ti9914Options options;
   Hardware hardware;
   ServerLog log{"test", "off"};
+  StopBell stop;
 };
 
 std::string refusalOfTi9914(const std::string& line) {
