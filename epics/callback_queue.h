@@ -14,13 +14,13 @@ namespace mpf {
 
 class CallbackQueue {
  public:
-  class Record {
+  class Record {  // NOLINT(cppcoreguidelines-virtual-class-destructor): nobody deletes a Record
    public:
     // Processes one message. Returns true when the record stays in the queue.
     [[nodiscard]] virtual bool processOne() = 0;
 
    protected:
-    ~Record() = default;
+    virtual ~Record() = default;
 
    private:
     friend class CallbackQueue;
