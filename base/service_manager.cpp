@@ -2,9 +2,11 @@
 #include "base/service_manager.h"
 
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +15,12 @@
 #include <mpf/file_descriptor.h>
 
 namespace mpf {
+namespace {
+
+constexpr timeval kLongestWait{.tv_sec = 0, .tv_usec = 100'000};
+constexpr std::chrono::microseconds kLongestWatchdog = std::chrono::hours(24);
+
+}  // namespace
 
 void ServiceManager::notifyReloading() noexcept {
   notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000));
@@ -26,7 +34,7 @@ std::optional<std::chrono::microseconds> ServiceManager::watchdogTime() noexcept
   if (time == nullptr || (pid != nullptr && std::atoi(pid) != ::getpid())) return std::nullopt;
   const auto microseconds = std::atoll(time);
   if (microseconds <= 0) return std::nullopt;
-  return std::chrono::microseconds(microseconds);
+  return std::min(std::chrono::microseconds(microseconds), kLongestWatchdog);
 }
 
 void ServiceManager::notify(const std::string& state) noexcept {
@@ -39,7 +47,9 @@ void ServiceManager::notify(const std::string& state) noexcept {
   std::memcpy(address.sun_path, path, length);
   if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // an abstract socket name
   const FileDescriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  // A failure is ignored: the router works without a service manager.
+  // A service manager that does not read must not stop the program.
+  ::setsockopt(socket.get(), SOL_SOCKET, SO_SNDTIMEO, &kLongestWait, sizeof kLongestWait);
+  // A failure is ignored: the program works without a service manager.
   static_cast<void>(::sendto(socket.get(), state.data(), state.size(), MSG_NOSIGNAL,
                              reinterpret_cast<const sockaddr*>(&address),
                              static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length)));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // ServiceManager: reports the state of the program to systemd, with one datagram to $NOTIFY_SOCKET
-// (sd_notify(3)). Does nothing when the variable is not set.
+// (sd_notify(3)). Does nothing when the variable is not set. If systemd does not read, a report is
+// lost after 100 ms.
 #pragma once
 
 #include <chrono>
@@ -21,7 +22,7 @@ class ServiceManager {
   static void notifyStatus(const std::string& status) noexcept { notify("STATUS=" + status); }
   // Tells systemd that the program makes progress; due twice within watchdogTime().
   static void notifyAlive() noexcept { notify("WATCHDOG=1"); }
-  // WatchdogSec= of the unit; nullopt: systemd does not watch this process.
+  // WatchdogSec= of the unit, at most a day; nullopt: systemd does not watch this process.
   [[nodiscard]] static std::optional<std::chrono::microseconds> watchdogTime() noexcept;
 
  private:

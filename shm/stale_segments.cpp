@@ -131,7 +131,7 @@ class Judge {
     if (parsed.kind == NameKind::serverWindow) {
       auto finding = judgeWindow(name, layout::SegmentKind::serverWindow, window);
       if (window) servers_.insert(window->header.incarnation);
-      if (finding.verdict == Verdict::dead && window)
+      if (finding.verdict == Verdict::dead && window && isAtItsName(name, window->header))
         deadWindows_.emplace(window->header.incarnation, DeadWindow{name, window->user});
       add(name, std::move(finding));
     } else if (parsed.kind == NameKind::clientWindow) {
@@ -145,6 +145,13 @@ class Judge {
     } else if (parsed.kind == NameKind::router || parsed.kind == NameKind::reaper) {
       add(name, judgeKeyed(name));
     }
+  }
+
+  // Otherwise the file is a copy of the window of another server, which may be alive.
+  [[nodiscard]] bool isAtItsName(const std::string& name,
+                                 const layout::SegmentHeader& header) const {
+    return name ==
+           SegmentName::serverWindow(backplane_, header.location, segments::text(header.name));
   }
 
   void hints(const std::string& name, const Parsed& parsed) {

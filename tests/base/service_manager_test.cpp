@@ -37,6 +37,15 @@ class NotifySocket {
   NotifySocket(const NotifySocket&) = delete;
   NotifySocket& operator=(const NotifySocket&) = delete;
 
+  // Sends datagrams to the socket until none fits.
+  void fill() const {
+    sockaddr_un address{};
+    socklen_t length = sizeof address;
+    auto* const generic = reinterpret_cast<sockaddr*>(&address);
+    ASSERT_EQ(::getsockname(socket_.get(), generic, &length), 0);
+    const FileDescriptor sender(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    while (::sendto(sender.get(), "other", 5, MSG_DONTWAIT, generic, length) > 0) continue;
+  }
   std::string receive() {
     std::string text(256, '\0');
     const auto bytes = ::recv(socket_.get(), text.data(), text.size(), MSG_DONTWAIT);
@@ -66,6 +75,19 @@ TEST(ServiceManager, ReportsEachState) {
   EXPECT_EQ(systemd.receive(), "EXTEND_TIMEOUT_USEC=30000000");
 }
 
+TEST(ServiceManager, DoesNotWaitForAServiceManagerThatDoesNotRead) {
+  const TemporaryFolder folder;
+  NotifySocket systemd((folder.path() / "notify").string());
+  systemd.fill();
+
+  ServiceManager::notifyReady();  // returns, and is lost
+
+  std::string report;
+  while (!(report = systemd.receive()).empty()) EXPECT_EQ(report, "other");
+  ServiceManager::notifyAlive();
+  EXPECT_EQ(systemd.receive(), "WATCHDOG=1");
+}
+
 TEST(ServiceManager, KnowsTheWatchdogOfItsProcess) {
   EXPECT_EQ(ServiceManager::watchdogTime(), std::nullopt);
   ::setenv("WATCHDOG_USEC", "5000000", 1);
@@ -77,6 +99,8 @@ TEST(ServiceManager, KnowsTheWatchdogOfItsProcess) {
 
   EXPECT_EQ(ServiceManager::watchdogTime(), std::nullopt);
   ::unsetenv("WATCHDOG_PID");
+  ::setenv("WATCHDOG_USEC", "99999999999999999999", 1);
+  EXPECT_EQ(ServiceManager::watchdogTime(), std::chrono::hours(24));
   ::setenv("WATCHDOG_USEC", "x", 1);
   EXPECT_EQ(ServiceManager::watchdogTime(), std::nullopt);
   ::unsetenv("WATCHDOG_USEC");

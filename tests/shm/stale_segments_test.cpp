@@ -4,6 +4,7 @@
 
 #include <sys/stat.h>
 
+#include <filesystem>
 #include <fstream>
 #include <map>
 
@@ -87,6 +88,23 @@ TEST_F(StaleSegmentsTest, NamesTheFreeLockForFilesOfDeadProcesses) {
       AllOf(HasSubstr("no process holds the lock of " + keyed(NameKind::clientWindow, incarnation)),
             HasSubstr("pid ")));
   for (const auto& [file, judged] : all) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
+}
+
+// Somebody keeps a copy of a file, to look at it later.
+TEST_F(StaleSegmentsTest, ACopyOfTheWindowOfALivingServerIsNoEvidenceAgainstIt) {
+  const auto window = SegmentName::serverWindow(name(), 0, "dac");
+  const OwnWindow server(name(), SegmentKind::serverWindow, window, {},
+                         [](layout::SegmentHeader& header) { header.name = {"dac"}; });
+  const auto incarnation = server.header().incarnation;
+  const auto copy = SegmentName::serverWindow(name(), 0, "dac-copy");
+  std::filesystem::copy_file("/dev/shm/" + window, "/dev/shm/" + copy);
+
+  const auto all = judge();
+
+  EXPECT_EQ(all.at(copy).verdict, Verdict::dead);
+  EXPECT_EQ(all.at(keyed(NameKind::hints, incarnation)).verdict, Verdict::alive);
+  EXPECT_EQ(all.at(keyed(NameKind::fifo, incarnation)).verdict, Verdict::alive);
+  segments::remove(copy);
 }
 
 TEST_F(StaleSegmentsTest, FilesWithoutAnOwnerAreDead) {
