@@ -11,14 +11,13 @@
 #include <iocInit.h>
 #include <iocsh.h>
 #include <iocshRegisterCommon.h>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/command_line.h"
 #include "base/run_main.h"
 #include "base/service_manager.h"
-#include "base/stop_bell.h"
+#include "epics/ioc/service_stop.h"
 
 namespace {
 
@@ -83,6 +82,7 @@ int run(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   app.add_option("-d,--database", options.databases, "Database to load; may be repeated")
       ->type_name("FILE")
+      ->allow_extra_args(false)
       ->check(CLI::ExistingFile);
   app.add_option("-m,--macros", options.macros, "Macros of the databases: \"P=lab:,N=1\"");
   app.add_flag("-S,--no-shell", options.noShell,
@@ -90,8 +90,7 @@ int run(int argc, char** argv) {
   app.add_flag("--check", options.checkOnly,
                "Only check the arguments and load the databases; run no commands");
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
-  std::optional<mpf::StopBell> stop;
-  if (options.noShell) stop.emplace();
+  static auto* const stop = options.noShell ? new mpf::ServiceStop : nullptr;  // never destroyed
 
   registerCommands();
   load(options);
@@ -103,7 +102,7 @@ int run(int argc, char** argv) {
     check(iocInit(), "iocInit failed: see the error above");
   }
   mpf::ServiceManager::notifyReady();
-  if (stop) stop->wait();
+  if (stop != nullptr) stop->wait();
   else iocsh(nullptr);
   epicsExit(0);
   return 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The program mpf-ioc, with commands on its standard input or in a startup file.
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <fmt/format.h>
@@ -102,6 +103,30 @@ TEST_F(IocProgram, RunsReportsWhoseOutputMayBeRedirected) {
   EXPECT_THAT(listed.str(), HasSubstr("lamp"));
 }
 
+TEST_F(IocProgram, ADatabaseMayStandBeforeTheStartupFile) {
+  const TemporaryFolder folder;
+  const auto database = folder.write("a.db", "record(ao, \"v\") {}");
+  const auto startup = folder.write("st.cmd", "iocInit\ndbl\n");
+
+  const auto result =
+      runCommand(fmt::format("{} -d {} {} </dev/null 2>&1", MPF_TEST_IOC, database, startup));
+
+  EXPECT_EQ(result.status, 0) << result.output;
+}
+
+TEST_F(IocProgram, ASignalEndsAServiceWhoseStartupDoesNotEnd) {
+  const TemporaryFolder folder;
+  const auto startup = folder.write(
+      "st.cmd", fmt::format("mpf ls > {}\nepicsThreadSleep 100000\n", folder.file("begun")));
+  Program ioc({MPF_TEST_IOC, "-S", startup});
+  while (::access(folder.file("begun").c_str(), F_OK) != 0) continue;
+
+  ioc.signal(SIGTERM);
+
+  EXPECT_THAT(ioc.waitForLine("mpf-ioc: "), HasSubstr("before its startup was complete"));
+  EXPECT_EQ(WEXITSTATUS(ioc.wait()), 1);
+}
+
 class IocRouter : public IocProgram {
  protected:
   // Starts an IOC whose startup file connects to another host, and ends it when one of its records
@@ -121,17 +146,19 @@ int IocRouter::runAndEnd(int signal) {
                    "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@lamp:1 address=7\")"
                    " field(SCAN, \".1 second\") }"));
   const auto startup = folder.write(
-      "st.cmd", fmt::format("routerInit\nlocalMessageRouterStart(0)\n"
-                            "tcpMessageRouterClientStart(1, {0}, \"127.0.0.1\", 1500, 40)\n"
-                            "tcpMessageRouterClientStart(1, {0}, \"127.0.0.1\", 1500, 40)\n"
-                            "dbLoadRecords(\"{1}\")\niocInit\n",
-                            port.substr(0, port.find('\n')), folder.file("a.db")));
+      "st.cmd",
+      fmt::format("routerInit\nlocalMessageRouterStart(0)\n"
+                  "tcpMessageRouterClientStart(1, {0}, \"127.0.0.1\", 1500, 40)\n"
+                  "tcpMessageRouterClientStart(1, {0}, \"127.0.0.1\", 1500, 40)\n"
+                  "dbLoadRecords(\"{1}\")\niocInit\ndbl > {2}\n",
+                  port.substr(0, port.find('\n')), folder.file("a.db"), folder.file("started")));
   Program ioc({MPF_TEST_IOC, "-S", startup});
 
   Message request;
   while (!(request = server.receive())) server.waitForMessage();
   const auto* question = request.tryAs<Int32>();
   EXPECT_TRUE(question != nullptr && question->address == 7);
+  while (::access(folder.file("started").c_str(), F_OK) != 0) continue;
   return ioc.end(signal);
 }
 
