@@ -29,8 +29,12 @@ void IocClients::onHook(int state) {
   if (state == initHookAfterShutdown) forget();
 }
 
-// PAIR(ioc-running): stored after the initialisation of the records.
-void IocClients::start() { isRunning_.store(true, std::memory_order_release); }
+void IocClients::start() {
+  // PAIR(ioc-running): stored after the initialisation of the records.
+  isRunning_.store(true, std::memory_order_release);
+  const std::lock_guard lock(mutex_);
+  for (const auto& [key, connection] : connections_) connection->reportAbsence();
+}
 
 void IocClients::close() {
   isRunning_.store(false, std::memory_order_relaxed);

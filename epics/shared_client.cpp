@@ -44,6 +44,13 @@ void SharedClient::bind() {
   if (!std::exchange(isBound_, true)) client_->bind(server_, location_);
 }
 
+void SharedClient::reportAbsence() {
+  const std::lock_guard lock(mutex_);
+  if (isConnected_) return;
+  for (auto* member : members_)
+    member->deliver(ConnectMessage({.status = ConnectStatus::connectNo}));
+}
+
 SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& message,
                               Deadline deadline, std::atomic<std::uint32_t>& requestId) {
   message.setClientType(static_cast<std::int32_t>(member << 2) | reply);

@@ -51,6 +51,9 @@ class SharedClient {
   [[nodiscard]] std::uint32_t add(Member& member);
   // Starts to connect. Calls after the first have no effect.
   void bind();
+  // Tells the members that the server is not connected, if it is not: no server may ever have been
+  // there.
+  void reportAbsence();
   // Empties `message` when the result is `sent`.
   //   requestId  out: the number of the request as soon as it is known, for cancel(); outlives the
   //              request

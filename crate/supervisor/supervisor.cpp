@@ -106,10 +106,6 @@ void Supervisor::takeOver() {
   }
 }
 
-void Supervisor::killAll() {
-  for (const auto& member : members_) signal(*member, SIGKILL);
-}
-
 void Supervisor::beginShutdown() {
   isShuttingDown_ = true;
   ServiceManager::notifyStopping();
@@ -195,6 +191,12 @@ void Supervisor::signal(Member& member, int number) {
   sendSignal(service.pid(), member.adopted, number);
 }
 
+void Supervisor::onStopSignal(int number) {
+  printError("mpf run: {}: {}\n", signalName(number), isShuttingDown_ ? "killing all" : "stopping");
+  if (!isShuttingDown_) return beginShutdown();
+  for (const auto& member : members_) signal(*member, SIGKILL);
+}
+
 void Supervisor::handleSignals() {
   while (const auto number = signals_.take()) {
     switch (*number) {
@@ -209,10 +211,7 @@ void Supervisor::handleSignals() {
         }
         break;
       default:
-        printError("mpf run: {}: {}\n", signalName(*number),
-                   isShuttingDown_ ? "killing what has not ended" : "stopping");
-        if (isShuttingDown_) killAll();
-        else beginShutdown();
+        onStopSignal(*number);
         break;
     }
   }

@@ -60,7 +60,7 @@ class Supervisor {
   std::vector<std::string> apply(const std::vector<ProcessPlan>& plans);
   std::vector<std::string> reload();
   void beginShutdown();
-  void killAll();
+  void onStopSignal(int number);
   void act();
   void start(Member& member);
   void signal(Member& member, int number);

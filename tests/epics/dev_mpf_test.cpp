@@ -30,6 +30,16 @@ TEST_F(DevMpfTest, AnAbsentServerIsACommAlarmWithTheReason) {
   EXPECT_EQ(Ioc::get("v.AMSG"), "server is not running");
 }
 
+TEST_F(DevMpfTest, AnAbsentServerIsAnAlarmOfARecordThatHasNotProcessed) {
+  const Ioc ioc(R"(record(longin, "v") {
+    field(DTYP, "MPF") field(INP, "@adc mode=subscribe") field(SCAN, "I/O Intr")
+  })");
+
+  Ioc::waitFor("v.STAT", "COMM");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "INVALID");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "server is not running");
+}
+
 TEST_F(DevMpfTest, ARecordRecoversWhenItsServerStarts) {
   const Ioc ioc(kRecord);
   ASSERT_EQ(Ioc::get("v.STAT"), "COMM");
