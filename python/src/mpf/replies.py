@@ -16,16 +16,19 @@ class NoMoreReplies(Exception):
     """The client has gone, or the server ends."""
 
 
+class NotHandled(StatusError):
+    """The server has no handler for requests of this class."""
+
+
 def with_value(request: Message, value: object) -> Message:
     """The request with this value."""
     kind = cast(Callable[..., Message], type(request))
     try:
         return kind(value, **fields_of(request))
     except TypeError as error:
-        name = type(request).__name__
         raise TypeError(
-            f"the handler returned {type(value)}, which is not the value of the reply "
-            f"to {name} requests: return a message"
+            f"{type(value)} is not the value of a reply to {kind.__name__} requests: "
+            "reply with a message"
         ) from error
 
 
@@ -33,7 +36,7 @@ def of_error(request: Message, error: Exception) -> Char8Array:
     """The reply to a request whose handler has raised this exception."""
     status = _status_of(error) if isinstance(error, StatusError) else -1
     fields: dict[str, Any] = {**fields_of(request), "status": status}
-    return Char8Array(_text_of(error).encode("utf-8", "backslashreplace"), **fields)
+    return Char8Array(text_of(error).encode("utf-8", "backslashreplace"), **fields)
 
 
 def fields_of(message: Message) -> dict[str, Any]:
@@ -48,7 +51,8 @@ def _status_of(error: StatusError) -> int:
     return error.status if isStatus else -1
 
 
-def _text_of(error: Exception) -> str:
+def text_of(error: Exception) -> str:
+    """What the client is told."""
     kind = type(error).__name__
     try:  # what a program raises need not have a text
         return str(error.text) if isinstance(error, StatusError) else f"{kind}: {error}"

@@ -39,7 +39,8 @@ from mpf import _mpf
 from mpf._mpf import Message
 from mpf.ending import at_sigterm, close_at_exit
 from mpf.errors import Error, QueueFull
-from mpf.replies import NoMoreReplies, of_error, with_value
+from mpf.failure_log import FailureLog
+from mpf.replies import NoMoreReplies, NotHandled, of_error, text_of, with_value
 from mpf.server_arguments import checked_mode, number_of_group, own_name_explained
 from mpf.streams import Streams
 
@@ -99,6 +100,7 @@ class Server(_mpf.BaseServer):
         self._tasks: set[asyncio.Task[Any]] = set()
         self._closing: set[asyncio.Task[Any]] = set()  # that have called close()
         self._streams = Streams()
+        self._failures = FailureLog(self.name)
         self._thread: threading.Thread | None = None
         self._state = threading.Condition()  # guards the next two
         self._runner: threading.Thread | None = None  # run() or serve() is in progress there
@@ -242,6 +244,7 @@ class Server(_mpf.BaseServer):
         try:
             yield
         finally:
+            self._failures.flush()
             with self._state:
                 self._runner = None
                 self._isFinishing = False
@@ -329,7 +332,7 @@ class Server(_mpf.BaseServer):
     def _handle(self, request: Message) -> object:
         handler = self._handlers.get(type(request)) or self._handlers.get(Message)
         if handler is None:
-            raise TypeError(f"{self.name} does not handle {type(request).__name__} messages")
+            raise NotHandled(f"{self.name} does not handle {type(request).__name__} messages")
         return handler(request)
 
     def _answer(self, request: Message, result: object) -> None:
@@ -372,11 +375,12 @@ class Server(_mpf.BaseServer):
             self.refuse(request)
 
     def _fail(self, request: Message, error: Exception) -> None:
-        _log.error("%s: %r failed", self.name, request, exc_info=error)
+        level = logging.DEBUG if isinstance(error, NotHandled) else logging.ERROR
+        self._failures.write(level, "%r failed: %s", request, text_of(error), error=error)
         try:
             self.reply(request, of_error(request, error))
         except Error as failure:
-            _log.error("%s: %s", self.name, failure)
+            self._failures.write(logging.ERROR, "%s", failure)
 
 
 def _check_class(kind: object) -> None:
