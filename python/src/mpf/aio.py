@@ -10,13 +10,13 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Iterable
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
 from mpf.aio_requests import CONNECTION, AsyncRequest, AsyncSubscription
 from mpf.client import LIMIT
+from mpf.closing import AsyncClosing
 from mpf.errors import NotConnected, QueueFull
 
 if TYPE_CHECKING:
@@ -25,11 +25,10 @@ if TYPE_CHECKING:
 M = TypeVar("M", bound=Message)
 R = TypeVar("R", bound=Message)
 S = TypeVar("S")
-Self = TypeVar("Self")
 
 
 
-class AsyncClient(_mpf.BaseClient):
+class AsyncClient(AsyncClosing, _mpf.BaseClient):
     """As Client, for asyncio: `await client.call(...)`, `async for ... in client.subscribe()`. The
     arguments are those of Client."""
 
@@ -47,17 +46,6 @@ class AsyncClient(_mpf.BaseClient):
         self._descriptor = -1
         self._timer: asyncio.TimerHandle | None = None
         self._waiting: dict[int, list[asyncio.Future[None]]] = {}
-
-    async def __aenter__(self: Self) -> Self:
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Disconnects. Calls in progress raise Cancelled."""

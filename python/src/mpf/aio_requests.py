@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from types import TracebackType
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from mpf._mpf import Message, Request
+from mpf.closing import AsyncClosing
 from mpf.errors import Error
 from mpf.subscription import SubscriptionBase
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from mpf.aio import AsyncClient
 
 M = TypeVar("M", bound=Message)
-Self = TypeVar("Self")
 
 CONNECTION = 0  # stands for the connection among the numbers of requests
 
@@ -74,7 +73,7 @@ class AsyncRequest:
         return self._request.connected
 
 
-class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
+class AsyncSubscription(AsyncClosing, SubscriptionBase["AsyncClient", M]):
     """The replies to one request; AsyncClient.subscribe() creates it.
 
     Cancelling a wait for a reply, for example with asyncio.wait_for(), loses no reply: the next
@@ -82,17 +81,6 @@ class AsyncSubscription(SubscriptionBase["AsyncClient", M]):
     """
 
     _hasFirst = False  # the request has had its first reply
-
-    async def __aenter__(self: Self) -> Self:
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __aiter__(self) -> AsyncIterator[M]:
         return self

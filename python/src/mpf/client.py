@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
+from mpf.closing import Closing
 from mpf.subscription import Subscription
 
 if TYPE_CHECKING:
@@ -21,13 +21,12 @@ if TYPE_CHECKING:
 
 M = TypeVar("M", bound=Message)
 R = TypeVar("R", bound=Message)
-Self = TypeVar("Self")
 
 #: Further replies that wait for a program, for each subscription.
 LIMIT = 1000
 
 
-class Client(_mpf.BaseClient):
+class Client(Closing, _mpf.BaseClient):
     """A client of the server `server` at `location`.
 
     location: of the server; by default MPF_LOCATION, or 0.
@@ -41,17 +40,6 @@ class Client(_mpf.BaseClient):
     Raises OSError if there is no memory in /dev/shm or no file descriptor, ValueError if an
     argument is invalid.
     """
-
-    def __enter__(self: Self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Disconnects. Requests without a reply end as Cancelled."""

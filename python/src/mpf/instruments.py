@@ -15,14 +15,13 @@ writes and reads belongs together. The commands are those of <mpf/serial_command
 from __future__ import annotations
 
 import math
-from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any
 
 from mpf._mpf import Char8Array, Int32, Message, SerialConfig
 from mpf.client import Client
+from mpf.closing import Closing
 from mpf.errors import InstrumentError, InstrumentTimeout
 
-Self = TypeVar("Self")
 
 _READ, _WRITE, _WRITE_READ, _POLL, _CLEAR, _TRIGGER = 1, 2, 3, 4, 5, 6
 _FLUSH, _SET_EOM, _MILLISECONDS = 0x10, 0x80, 0x100
@@ -53,7 +52,7 @@ def _milliseconds(seconds: float) -> int:
     return max(1, math.ceil(min(seconds, _LONGEST) * 1000))
 
 
-class Instrument:
+class Instrument(Closing):
     """What Serial and Gpib have in common.
 
     timeout: [s] of operations without their own: how long the instrument may take, from the moment
@@ -86,17 +85,6 @@ class Instrument:
         #: [s] how much longer an operation may last
         self.queue_timeout = queue_timeout
         self._status_texts = status_texts
-
-    def __enter__(self: Self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Disconnects from the server."""

@@ -32,11 +32,12 @@ import math
 import threading
 import time
 from collections.abc import AsyncGenerator, Callable, Generator, Iterable
-from types import AsyncGeneratorType, GeneratorType, TracebackType
+from types import AsyncGeneratorType, GeneratorType
 from typing import Any, TypeVar, cast
 
 from mpf import _mpf
 from mpf._mpf import Message
+from mpf.closing import Closing
 from mpf.ending import at_sigterm, close_at_exit
 from mpf.errors import Error, QueueFull
 from mpf.failure_log import FailureLog
@@ -54,7 +55,7 @@ _NOT_HERE = (Error, RuntimeError)  # the server is closed, or that of a parent p
 _PAUSE = 0.001  # [s] between attempts to send a reply to a full queue
 
 
-class Server(_mpf.BaseServer):
+class Server(Closing, _mpf.BaseServer):
     """A server with this name.
 
     location: by default MPF_LOCATION, or 0.
@@ -107,17 +108,6 @@ class Server(_mpf.BaseServer):
         self._closesAtEnd = False
         self._isFinishing = False  # coroutines end before run() does
         close_at_exit(self)
-
-    def __enter__(self: Self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def on(self, type: type[M]) -> Callable[[H], H]:
         """Makes a function or a coroutine function the handler of requests of this class.

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from types import TracebackType
 from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
 from mpf._mpf import Message, Request
+from mpf.closing import Closing
 from mpf.errors import Error, NotConnected, is_end_of_server
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 C = TypeVar("C")  # the class of the client
 M = TypeVar("M", bound=Message)
-Self = TypeVar("Self")
 
 _LOOK = 0.1  # [s] between looks whether a subscription that waits for its server was closed
 
@@ -64,19 +63,8 @@ class SubscriptionBase(Generic[C, M]):
             request.close()
 
 
-class Subscription(SubscriptionBase["Client", M]):
+class Subscription(Closing, SubscriptionBase["Client", M]):
     """The replies to one request, as an iterator; Client.subscribe() creates it."""
-
-    def __enter__(self: Self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __iter__(self) -> Iterator[M]:
         return self
