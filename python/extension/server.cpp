@@ -206,11 +206,7 @@ void addServer(nb::module_& module) {
            "max_borrowed"_a = 4, "wait"_a = "adaptive", "mode"_a = 0600, "group"_a = nb::none())
       .def("_receive", &PyServer::receive, "timeout"_a,
            nb::sig("def _receive(self, timeout: float) -> Message | None"))
-      .def("reply", &PyServer::reply, "request"_a, "message"_a,
-           "Sends `message` to the client of `request`. The first reply ends the request; any "
-           "number may follow. Any thread; never waits.\n\n"
-           "Returns False when the client has gone. Raises QueueFull when the client does not take "
-           "further replies, and TooLarge.")
+      .def("_reply", &PyServer::reply, "request"_a, "message"_a)
       .def("refuse", &PyServer::refuse, "request"_a,
            "Ends the request without a reply: its client gets Refused.")
       .def("loan", &PyServer::loan, "request"_a, "type"_a, "length"_a,

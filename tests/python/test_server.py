@@ -81,6 +81,23 @@ def test_a_handler_may_reply_later_and_often(server: mpf.Server) -> None:
     kept.clear()
 
 
+def test_a_further_reply_may_be_a_value(server: mpf.Server) -> None:
+    kept: list[mpf.Float64] = []
+    server.on(mpf.Float64)(kept.append)
+
+    with server.start(), mpf.Client("tested", timeout=PATIENCE) as client:
+        with client.subscribe(mpf.Float64(address=3)) as replies:
+            next(replies)
+            assert server.reply(kept[0], 2.5)
+            with pytest.raises(TypeError, match="'str'> .* Float64 requests: reply with a message"):
+                server.reply(kept[0], "x")
+            kept[0].value = 3.5
+            assert server.reply(kept.pop())
+            further = [next(replies) for _ in range(2)]
+
+    assert [(reply.value, reply.address) for reply in further] == [(2.5, 3), (3.5, 3)]
+
+
 def test_coroutines_run_at_the_same_time(server: mpf.Server) -> None:
     both = 0
     met: asyncio.Event | None = None

@@ -204,6 +204,19 @@ class Server(Closing, _mpf.BaseServer):
         self._isFinishing = True
         self._interrupt()
 
+    def reply(self, request: Message, value: object = None) -> bool:
+        """Sends a reply to the client of `request`: a message or a value, as a handler returns it.
+        The first reply ends the request; any number may follow. Any thread; never waits.
+
+        Returns False when the client has gone. Raises QueueFull when the client does not take
+        further replies, and TooLarge.
+        """
+        if value is None:
+            return self._reply(request, request)
+        if isinstance(value, Message):
+            return self._reply(request, value)
+        return self._reply(request, with_value(request, value))
+
     def publish(self, message: Message, requests: Iterable[M]) -> list[M]:
         """Sends `message` to the clients of all these requests, which read the same memory: for any
         number of clients, the elements are copied once. An array that loan_shared() returned is not
@@ -327,7 +340,7 @@ class Server(Closing, _mpf.BaseServer):
 
     def _answer(self, request: Message, result: object) -> None:
         if not isinstance(result, GeneratorType):
-            self._reply_with(request, result)
+            self.reply(request, result)
             return
         hasReplied = False
         with contextlib.closing(cast("Generator[object]", result)) as values:
@@ -343,7 +356,7 @@ class Server(Closing, _mpf.BaseServer):
         if self._is_interrupted or self._isFinishing or self._closesAtEnd:
             raise NoMoreReplies
         try:
-            wasSent = self._reply_with(request, value)
+            wasSent = self.reply(request, value)
         except QueueFull:
             wasSent = False
             if self.is_client_connected(request):
@@ -351,14 +364,6 @@ class Server(Closing, _mpf.BaseServer):
         if not wasSent:
             raise NoMoreReplies
         return True
-
-    def _reply_with(self, request: Message, value: object) -> bool:
-        """Returns False when the client has gone."""
-        if value is None:
-            return self.reply(request, request)
-        if isinstance(value, Message):
-            return self.reply(request, value)
-        return self.reply(request, with_value(request, value))
 
     def _give_up(self, request: Message) -> None:
         with contextlib.suppress(*_NOT_HERE):
@@ -368,7 +373,7 @@ class Server(Closing, _mpf.BaseServer):
         level = logging.DEBUG if isinstance(error, NotHandled) else logging.ERROR
         self._failures.write(level, "%r failed: %s", request, text_of(error), error=error)
         try:
-            self.reply(request, of_error(request, error))
+            self._reply(request, of_error(request, error))
         except Error as failure:
             self._failures.write(logging.ERROR, "%s", failure)
 
