@@ -1,15 +1,30 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/sync_client.h>
 
+#include <algorithm>
 #include <fmt/format.h>
+#include <string_view>
 
 #include "base/duration_text.h"
+#include "base/printable.h"
 
 namespace mpf {
 namespace {
 
 // After so many steps the dispatcher has looked at deadlines, however many replies wait.
 constexpr int kStepsToDeadlines = 64;
+
+constexpr std::size_t kShownCharacters = 500;
+
+// The words of a server that could not do what was asked, such as one in Python.
+std::string wordsOf(const Message& reply) {
+  const auto* fields = reply.tryAs<Char8Array>();
+  const auto status = fields == nullptr ? 0 : fields->status;
+  if (status == 0) return {};
+  const auto value = reply.valueAs<Char8Array>();
+  const std::string_view text(value.data(), std::min(value.size(), kShownCharacters));
+  return fmt::format("; it has status {}: \"{}\"", status, printable(text));
+}
 
 }  // namespace
 
@@ -20,8 +35,8 @@ std::string Answer::why() const {
   if (!reply_ || expected_ == MessageType::none) return {};
   if (reply_.getType() == expected_)
     return fmt::format("the reply is no valid {} message", toString(expected_));
-  return fmt::format("the reply is of type {}, not {}", toString(reply_.getType()),
-                     toString(expected_));
+  return fmt::format("the reply is of type {}, not {}{}", toString(reply_.getType()),
+                     toString(expected_), wordsOf(reply_));
 }
 
 SyncClient::SyncClient(const Backplane& backplane, const std::string& server, std::int32_t location,

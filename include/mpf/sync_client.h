@@ -49,8 +49,8 @@ class Answer {
   [[nodiscard]] std::optional<Fate> fate() const noexcept { return fate_; }
   // Why a request was not sent.
   [[nodiscard]] std::optional<SendResult> refusal() const noexcept { return refusal_; }
-  // Why there is no reply; after as() has returned nullopt, why the reply has another type.
-  // Otherwise empty.
+  // Why there is no reply; after as() has returned nullopt, which type the reply has instead, with
+  // its status and text if it is a Char8Array with a status other than 0. Otherwise empty.
   [[nodiscard]] std::string why() const;
 
  private:

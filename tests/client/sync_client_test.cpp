@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <gtest/gtest.h>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -112,6 +113,19 @@ TEST(SyncClientTest, SaysThatTheReplyIsOfAnotherType) {
   EXPECT_EQ(answer.why(), "the reply is of type float64, not int32");
   EXPECT_TRUE(answer.as<Float64>());
   EXPECT_EQ(answer.why(), "");
+}
+
+TEST(SyncClientTest, SaysWhyTheServerRepliedWithText) {
+  constexpr std::string_view kText = "no range\x1b";
+  auto reply = Char8ArrayMessage::allocValue(kText.size());
+  reply->status = -7;
+  std::ranges::copy(kText, reply.value().begin());
+  Answer answer(std::move(reply));
+
+  EXPECT_FALSE(answer.as<Int32>());
+
+  EXPECT_EQ(answer.why(),
+            "the reply is of type char8Array, not int32; it has status -7: \"no range\\x1b\"");
 }
 
 // Servers that end and are replaced while clients call: each request is executed exactly once.
