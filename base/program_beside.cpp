@@ -15,8 +15,8 @@ std::string programBeside(const std::string& name) {
   return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / name).string();
 }
 
-int executeBeside(const std::string& name, std::vector<std::string> arguments,
-                  const std::string& remedy) {
+int executeProgram(const std::string& name, std::vector<std::string> arguments,
+                   const std::string& remedy) {
   const auto program = programBeside(name);
   arguments.insert(arguments.begin(), program);
   std::vector<char*> pointers;
@@ -24,7 +24,10 @@ int executeBeside(const std::string& name, std::vector<std::string> arguments,
   for (auto& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
   ::execv(program.c_str(), pointers.data());
-  printError("cannot start {}: {}; {}\n", program, std::strerror(errno), remedy);
+  const auto error = errno;
+  if (error == ENOENT) ::execvp(name.c_str(), pointers.data());
+  printError("cannot start {}: {}{}; {}\n", program, std::strerror(error),
+             error == ENOENT ? ", nor in PATH" : "", remedy);
   return 1;
 }
 

@@ -11,6 +11,9 @@
 namespace mpf::tools {
 namespace {
 
+constexpr const char* kInstall =
+    "install MPF with `make install`: the Python package does not have this program";
+
 // A subcommand that passes all its arguments to `program`.
 //   before  arguments before those of the user
 void addProgram(CLI::App& app, Run& run, const std::string& name, const std::string& purpose,
@@ -24,7 +27,7 @@ void addProgram(CLI::App& app, Run& run, const std::string& name, const std::str
       auto arguments = before;
       const auto others = command.remaining();
       arguments.insert(arguments.end(), others.begin(), others.end());
-      return executeBeside(program, arguments, remedy);
+      return executeProgram(program, arguments, remedy);
     };
   });
 }
@@ -43,15 +46,14 @@ void addCrate(CLI::App& app, Run& run) {
            {"start", "Starts a process of a crate that was stopped or has failed"},
            {"restart", "Restarts a process of a crate"},
            {"reload", "Reads a crate file again, and restarts what has changed"}})
-    addProgram(app, run, name, purpose, "mpf-crate", {name},
-               "install it in the same folder as mpf");
+    addProgram(app, run, name, purpose, "mpf-crate", {name}, kInstall);
 }
 
 void addTorture(CLI::App& app, Run& run) {
   addProgram(app, run, "torture",
              "Kills clients and servers at each step, and checks that all other processes "
              "continue; see `mpf torture --help`",
-             "mpf-torture", {}, "install it in the same folder as mpf");
+             "mpf-torture", {}, kInstall);
 }
 
 void addBench(CLI::App& app, Run& run) {

@@ -17,16 +17,16 @@ TEST(ProgramBesideTest, IsInTheFolderOfThisProgram) {
 TEST(ProgramBesideTest, SaysWhichProgramIsMissingAndWhatToDo) {
   testing::internal::CaptureStderr();
 
-  EXPECT_EQ(executeBeside("mpf-missing", {"-x"}, "install it"), 1);
+  EXPECT_EQ(executeProgram("mpf-missing", {"-x"}, "install it"), 1);
 
   const auto error = testing::internal::GetCapturedStderr();
   EXPECT_THAT(error, HasSubstr("cannot start " + programBeside("mpf-missing")));
-  EXPECT_THAT(error, HasSubstr("No such file or directory; install it"));
+  EXPECT_THAT(error, HasSubstr("No such file or directory, nor in PATH; install it"));
 }
 
 TEST(ProgramBesideDeathTest, ReplacesThisProcess) {
   testing::GTEST_FLAG(death_test_style) = "fast";
-  EXPECT_EXIT(std::_Exit(executeBeside("base_test", {"--gtest_list_tests"}, "")),
+  EXPECT_EXIT(std::_Exit(executeProgram("base_test", {"--gtest_list_tests"}, "")),
               testing::ExitedWithCode(0), "");
 }
 

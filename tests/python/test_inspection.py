@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import PATIENCE
+from conftest import PATIENCE, PROGRAMS
 
 import mpf
 from mpf import inspection, program
@@ -79,6 +79,11 @@ def test_a_recording_that_cannot_be_written_is_an_error(
 ) -> None:
     with pytest.raises(mpf.Error, match=reason):
         mpf.record("dac", tmp_path / file)
+
+
+def test_the_package_is_the_program() -> None:
+    shown = subprocess.check_output([sys.executable, "-m", "mpf", "call", "--help"])
+    assert shown == subprocess.check_output([PROGRAMS / "mpf", "call", "--help"])
 
 
 def test_a_program_that_writes_nothing_is_an_error(

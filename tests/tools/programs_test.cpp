@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf torture` and `mpf bench` execute programs that are in the folder of `mpf`.
+// `mpf torture` and `mpf bench` execute programs that are in the folder of `mpf`, or in PATH.
 #include <sys/wait.h>
 
 #include <filesystem>
@@ -35,17 +35,29 @@ TEST_F(ProgramsTest, GetAllArgumentsUnchanged) {
   EXPECT_EQ(ended.output, folder_.file("mpf-torture") + "\n--help\na b\n--\n--backplane=x\n");
 }
 
+TEST_F(ProgramsTest, MayBeInPath) {
+  install("mpf-torture", std::filesystem::perms::owner_all);
+  const TemporaryFolder other;
+  std::filesystem::rename(program_, other.file("mpf"));
+
+  const auto ended =
+      runCommand("PATH=" + folder_.path().string() + " " + other.file("mpf") + " torture -x");
+
+  EXPECT_EQ(WEXITSTATUS(ended.status), 7);
+  EXPECT_THAT(ended.output, testing::EndsWith("mpf-torture\n-x\n"));
+}
+
 TEST_F(ProgramsTest, AMissingProgramIsAnErrorWithARemedy) {
-  const auto torture = runCommand(program_ + " torture 2>&1");
-  const auto bench = runCommand(program_ + " bench local 2>&1");
+  const auto torture = runCommand("PATH=/nowhere " + program_ + " torture 2>&1");
+  const auto bench = runCommand("PATH=/nowhere " + program_ + " bench local 2>&1");
 
   EXPECT_EQ(WEXITSTATUS(torture.status), 1);
   EXPECT_EQ(torture.output, "cannot start " + folder_.file("mpf-torture") +
-                                ": No such file or directory; install it in the same folder as "
-                                "mpf\n");
+                                ": No such file or directory, nor in PATH; install MPF with `make "
+                                "install`: the Python package does not have this program\n");
   EXPECT_EQ(WEXITSTATUS(bench.status), 1);
   EXPECT_EQ(bench.output, "cannot start " + folder_.file("mpf-bench") +
-                              ": No such file or directory; build MPF with "
+                              ": No such file or directory, nor in PATH; build MPF with "
                               "MPF_BUILD_BENCHMARKS=ON to get this program\n");
 }
 
