@@ -92,7 +92,7 @@ enum class Fate : std::int32_t {
 inline constexpr std::array<std::string_view, 5> kFateNames{
     "refused", "neverTaken", "outcomeUnknown", "expired", "cancelled"};
 inline constexpr std::array<std::string_view, 5> kFateMeanings{
-    "the server did not accept the request, or dropped it without a reply",
+    "the server has no handler for messages of this type, or dropped the request",
     "the server ended before it took the request: nothing was done",
     "the server may have taken the request and carried it out",
     "the server did not take the request in time: nothing was done",

@@ -45,7 +45,9 @@ struct Ending {
 Ending endingOf(Fate fate) {
   switch (fate) {
     case Fate::refused:
-      return {"Refused", "the server refused the request"};
+      return {"Refused",
+              "refused: the server has no handler for messages of this class, or dropped the "
+              "request"};
     case Fate::neverTaken:
       return {"NeverTaken",
               "the connection ended before the server took the request: nothing was done"};

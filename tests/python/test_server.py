@@ -236,7 +236,7 @@ def test_a_handler_replaces_the_earlier_one(server: mpf.Server) -> None:
 
 def test_a_generator_without_values_refuses_the_request(server: mpf.Server) -> None:
     server.on(mpf.Int32)(lambda request: (number for number in ()))
-    with server.start(), pytest.raises(mpf.Refused):
+    with server.start(), pytest.raises(mpf.Refused, match="no handler .* or dropped the request"):
         call(mpf.Int32())
 
 

@@ -256,8 +256,8 @@ TEST_F(CallTest, ATypeWithoutAHandlerIsRefused) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.err,
-            "mpf call: no reply: refused (the server did not accept the request, or dropped it "
-            "without a reply)\n");
+            "mpf call: no reply: refused (the server has no handler for messages of this type, or "
+            "dropped the request)\n");
 }
 
 // Whether the server has taken the request by then depends on the speed of the machine.
