@@ -27,7 +27,7 @@ class Connections {
  public:
   explicit Connections(Endpoint& endpoint) noexcept : endpoint_(endpoint) {}
 
-  // RelayServer::onClient().
+  // MessageServer::onClient().
   void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback) {
     onClient_ = std::move(callback);
   }

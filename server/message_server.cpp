@@ -46,6 +46,9 @@ std::uint64_t MessageServer::clientOf(const Message& request) const noexcept {
 bool MessageServer::isClientConnected(const Message& request) const noexcept {
   return Connections::isConnected(request.route());
 }
+void MessageServer::onClient(std::function<void(std::uint64_t, bool)> callback) {
+  core_->connections().onClient(std::move(callback));
+}
 ReplyResult MessageServer::reply(Message&& message) { return core_->replies().send(message); }
 
 RepliedMany MessageServer::replyMany(std::span<Message> replies) noexcept {

@@ -5,9 +5,6 @@
 
 namespace mpf {
 
-void RelayServer::onClient(std::function<void(std::uint64_t, bool)> callback) {
-  core_->connections().onClient(std::move(callback));
-}
 std::shared_ptr<const void> RelayServer::closeAll() {
   struct Pools {
     Connections::Channels channels;

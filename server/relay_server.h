@@ -17,10 +17,6 @@ class RelayServer : public MessageServer {
   using MessageServer::MessageServer;
   using MessageServer::receive;
 
-  // Sets a callback for clients that connect (isConnected true) and disconnect or die (false).
-  // receive() calls it. Set it before the first receive(). When it throws, receive() finishes its
-  // work on the connections and then throws the same exception.
-  void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback);
   // Closes all connections, as the destructor does, which then does not wait for the clients. Call
   // no other function afterwards.
   //   returns  what has to exist for a moment longer, even without the server, so that clients

@@ -28,9 +28,10 @@
 // Trust    a client that sends invalid data loses its connection; other clients are not affected.
 // Throws   an exception that leaves a handler leaves run(), runUntilSignal() or handleOne(); the
 //          requests that it was called with, if they had no reply, end as `refused`. An exception
-//          that leaves the callback of onClient() leaves receive(). Nothing else is lost, and the
-//          next call continues with the remaining requests. Clients follow the same rule: see
-//          Dispatcher.
+//          that leaves the callback of onClient() leaves receive() and what calls it. Nothing else
+//          is lost, and the next call continues with the remaining requests. An exception that
+//          main() does not catch ends the program: the request and all others that were taken end
+//          as `outcomeUnknown`. Clients follow the same rule: see Dispatcher.
 #pragma once
 
 #include <cstddef>
@@ -133,6 +134,14 @@ class MessageServer {
   // Whether that client is still connected and alive. Any thread, also during a handler: clientOf()
   // notices a dead client only when the thread of the server has called receive() again.
   [[nodiscard]] bool isClientConnected(const Message& request) const noexcept;
+  // Sets a callback for clients that connect (isConnected true), and that disconnect or die
+  // (false), so that a server can release what it holds for a client. receive() calls it: before
+  // it returns the first request of the client, and after it has returned the last one. The
+  // destructor of the server does not call it. Set it before the first receive(). The callback may
+  // reply, but must not call receive(), handleOne() or run(). When it throws, receive() finishes
+  // its work on the connections and then throws the same exception.
+  //   client  the number that clientOf() returns for the requests of the client
+  void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback);
 
   // Returns a reply to `request`, with its clientType and clientExtra and all fields 0 (manual,
   // "Message Server"). Send it with reply(), before or after a reply that reuses the request
@@ -263,13 +272,13 @@ class MessageServer {
   }
   // Handles requests until interrupt(), which takes effect between two calls of a handler. Refuses
   // requests of a type that has no handler.
-  //   throws  what a handler throws; the other requests wait until run() is called again;
-  //           std::logic_error when another thread is in run()
+  //   throws  what a handler or the callback of onClient() throws; the other requests wait until
+  //           run() is called again; std::logic_error when another thread is in run()
   void run();
   // As run(), until SIGINT or SIGTERM. Returns the exit status of a program: 0.
   int runUntilSignal();
   // Calls one handler, without waiting; returns false when no request waits.
-  //   throws  what its handler throws
+  //   throws  what its handler or the callback of onClient() throws
   bool handleOne();
 
   // --- operation
