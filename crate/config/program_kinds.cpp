@@ -4,9 +4,42 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <utility>
 
 namespace mpf::crate {
 namespace {
+
+using Names = std::vector<std::string>;
+
+// Adds the first field of each value of an option.
+void addFirstFields(const Process& process, const std::string& key, Names& to) {
+  const auto* const setting = process.find(key);
+  if (setting == nullptr) return;
+  for (const auto& value : setting->values) to.push_back(fieldsOf(value).front());
+}
+
+Names moduleServer(const Process& process) { return {process.valueOf("module")}; }
+
+Names serialServers(const Process& process) {
+  Names names;
+  addFirstFields(process, "server", names);
+  return names;
+}
+
+Names gpibServer(const Process& process) { return {process.valueOf("server")}; }
+
+Names digitalIoServers(const Process& process) {
+  const auto module = process.valueOf("module");
+  return {module + "In", module + "Out"};
+}
+
+Names ip330Servers(const Process& process) {
+  Names names;
+  for (const auto* const key : {"scan", "config", "sweep", "pid"})
+    addFirstFields(process, key, names);
+  const auto module = process.valueOf("module");
+  return names.empty() ? Names{module, module + "Config"} : names;
+}
 
 // Options of the programs that drive modules of carriers.
 std::vector<OptionKind> withHardware(std::vector<OptionKind> options) {
@@ -40,7 +73,8 @@ std::vector<ProgramKind> makeKinds() {
             {"resync-limit", {}},
             {"max-timeout", {}},
             {"max-retries", {}}}),
-       true});
+       true,
+       serialServers});
   kinds.push_back({"gpib",
                    "mpf-gpib-server",
                    Entry::server,
@@ -52,14 +86,16 @@ std::vector<ProgramKind> makeKinds() {
                                  {"poll-timeout", {}},
                                  {"ti9914", {"module", "carrier", "site", "vector"}},
                                  {"meter", {"address", "wire"}}}),
-                   true});
+                   true,
+                   gpibServer});
   kinds.push_back({"dac128v",
                    "mpf-dac128v-server",
                    Entry::server,
                    {"module", "carrier", "site", "queuesize"},
                    3,
                    withHardware({{"ranges", {}}}),
-                   true});
+                   true,
+                   moduleServer});
   kinds.push_back({"digital-io",
                    "mpf-digital-io-server",
                    Entry::server,
@@ -67,7 +103,8 @@ std::vector<ProgramKind> makeKinds() {
                     "fallingmask", "bimask", "maxclients"},
                    3,
                    withHardware({{"kind", {}}, {"input", {}}}),
-                   true});
+                   true,
+                   digitalIoServers});
   kinds.push_back(
       {"ip330",
        "mpf-ip330-server",
@@ -84,21 +121,29 @@ std::vector<ProgramKind> makeKinds() {
                      {"sweep", {"name", "first", "last", "points", "queue"}},
                      {"pid", {"name", "channel", "dac", "dacchannel", "queue"}},
                      {"dac", {"module", "carrier", "site"}}}),
-       true});
+       true,
+       ip330Servers});
   kinds.push_back({"ip440",
                    "mpf-ip440-server",
                    Entry::server,
                    {"module", "carrier", "site", "queuesize"},
                    3,
                    withHardware({{"inputs", {}}, {"input", {}}}),
-                   true});
-  for (const auto* const name : {"int32", "char8-array"}) {
+                   true,
+                   moduleServer});
+  for (const auto& [name, otherwise] :
+       {std::pair{"int32", "Int32"}, std::pair{"char8-array", "Char8Array"}}) {
     kinds.push_back({name,
                      std::string("mpf-") + name + "-server",
                      Entry::server,
                      {"server"},
                      0,
-                     {{"queue-size", {}}}});
+                     {{"queue-size", {}}},
+                     false,
+                     [otherwise](const Process& process) {
+                       const auto server = process.valueOf("server");
+                       return Names{server.empty() ? otherwise : server};
+                     }});
   }
   kinds.push_back({"router",
                    "mpf-router",
@@ -127,17 +172,6 @@ std::vector<ProgramKind> makeKinds() {
   kinds.push_back(
       {"ioc", "mpf-ioc", Entry::ioc, {"startup"}, 0, {{"database", {}}, {"macros", {}}}});
   return kinds;
-}
-
-// Adds the field `field` of each value of an option.
-void addField(const Process& process, const std::string& key, std::size_t field,
-              std::vector<std::string>& to) {
-  const auto* const setting = process.find(key);
-  if (setting == nullptr) return;
-  for (const auto& value : setting->values) {
-    const auto fields = fieldsOf(value);
-    if (field < fields.size()) to.push_back(fields[field]);
-  }
 }
 
 }  // namespace
@@ -200,25 +234,10 @@ std::vector<std::string> fieldsOf(const std::string& value) {
 
 std::vector<std::string> serversOf(const Process& process) {
   auto names = process.servers;
-  const auto module = process.valueOf("module");
-  if (process.kind == "dac128v" || process.kind == "ip440") {
-    names.push_back(module);
-  } else if (process.kind == "digital-io") {
-    names.insert(names.end(), {module + "In", module + "Out"});
-  } else if (process.kind == "ip330") {
-    const auto before = names.size();
-    for (const auto* const key : {"scan", "config", "sweep", "pid"})
-      addField(process, key, 0, names);
-    if (names.size() == before) names.insert(names.end(), {module, module + "Config"});
-  } else if (process.kind == "serial") {
-    addField(process, "server", 0, names);
-  } else if (process.kind == "gpib") {
-    names.push_back(process.valueOf("server"));
-  } else if (process.kind == "int32" || process.kind == "char8-array") {
-    const auto server = process.valueOf("server");
-    const auto* const otherwise = process.kind == "int32" ? "Int32" : "Char8Array";
-    names.push_back(server.empty() ? otherwise : server);
-  }
+  const auto* const kind = findKind(process.kind);
+  if (kind == nullptr || !kind->servers) return names;
+  const auto own = kind->servers(process);
+  names.insert(names.end(), own.begin(), own.end());
   return names;
 }
 

@@ -5,6 +5,7 @@
 // Threads  constant data.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,6 +32,8 @@ struct ProgramKind {
   std::size_t required = 0;  // the first positionals, which must be there
   std::vector<OptionKind> options;
   bool usesCarriers = false;
+  // The names of the servers of a process; empty: a kind without servers of its own.
+  std::function<std::vector<std::string>(const Process&)> servers{};
 
   [[nodiscard]] const OptionKind* findOption(std::string_view key) const;
   // All keys: positionals, options, and those of all servers.

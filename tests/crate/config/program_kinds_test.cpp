@@ -83,6 +83,18 @@ Process processOf(const std::string& kind, std::vector<Setting> settings) {
   return process;
 }
 
+// Otherwise the supervisor would report a program ready before clients find its servers.
+TEST(ServersOf, EachKindOfServerHasAName) {
+  for (const auto& kind : programKinds()) {
+    if (kind.entry != Entry::server) continue;
+    std::vector<Setting> settings;
+    for (const auto& key : kind.positionals) settings.push_back({key, {"a"}, {}});
+    EXPECT_THAT(serversOf(processOf(kind.name, std::move(settings))),
+                testing::Contains(testing::StartsWith("a")))
+        << kind.name;
+  }
+}
+
 TEST(ServersOf, AreTheNamesThatClientsBindTo) {
   EXPECT_THAT(serversOf(processOf("dac128v", {{"module", {"dac"}, {}}})), ElementsAre("dac"));
   EXPECT_THAT(serversOf(processOf("digital-io", {{"module", {"dio"}, {}}})),
