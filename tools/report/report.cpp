@@ -8,10 +8,30 @@
 #include <mpf/backplane.h>
 
 #include "base/command_line.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
 #include "tools/arguments.h"
 #include "tools/text/json_text.h"
 
 namespace mpf::tools {
+namespace {
+
+bool isWindowOfProcess(const std::string& segment) {
+  const auto parsed = SegmentName::tryParse(segment);
+  return parsed &&
+         (parsed->kind == NameKind::serverWindow || parsed->kind == NameKind::clientWindow) &&
+         segments::probeOwner(segment) == segments::Owner::alive;
+}
+
+// The end of a sentence about a backplane that does not exist; empty when no other has a process.
+std::string advice(std::vector<std::string> backplanes) {
+  std::erase_if(backplanes, [](const auto& name) {
+    return std::ranges::none_of(Backplane::named(name).segmentNames(), isWindowOfProcess);
+  });
+  return backplanes.empty() ? "" : fmt::format("; use one of {}", fmt::join(backplanes, ", "));
+}
+
+}  // namespace
 
 void addReport(CLI::App& app, ReportArguments& arguments) {
   addBackplane(app, arguments.backplane, "all backplanes");
@@ -35,8 +55,7 @@ int reportEach(const ReportArguments& arguments,
   const auto all = Backplane::names();
   for (const auto& backplane : backplanes) {
     if (!arguments.json && std::ranges::find(all, backplane) == all.end()) {
-      fmt::print("backplane {} has no process{}\n", backplane,
-                 all.empty() ? "" : fmt::format("; use one of {}", fmt::join(all, ", ")));
+      fmt::print("backplane {} has no process{}\n", backplane, advice(all));
       continue;
     }
     const SnapshotDelta delta(backplane, arguments.interval);

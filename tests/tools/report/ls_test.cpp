@@ -208,14 +208,21 @@ TEST_F(ReportTest, RatesAreThoseBetweenTheSnapshots) {
   EXPECT_EQ(load.end().status, 0);
 }
 
-TEST_F(ReportTest, SaysThatABackplaneHasNoProcess) {
+TEST_F(ReportTest, SaysThatABackplaneHasNoProcessAndWhichOnesHave) {
   const EchoThread echo(backplane_, "echo");
+  const TestBackplane dead;
+  Victim victim("serve", dead.name());
+  ASSERT_EQ(victim.line(), "open");
+  victim.end(SIGKILL);
 
   const auto ended = run({"ls", "--backplane", backplane_.name() + "-typo"});
 
   EXPECT_THAT(ended.out, testing::StartsWith("backplane " + backplane_.name() +
                                              "-typo has no process; use one of "));
-  EXPECT_THAT(ended.out, HasSubstr(backplane_.name()));
+  const auto advised = ended.out.substr(ended.out.find("; use one of"));
+  EXPECT_THAT(advised, HasSubstr(backplane_.name()));
+  EXPECT_THAT(advised, Not(HasSubstr(dead.name())));
+  static_cast<void>(dead.removeDead());
 }
 
 }  // namespace
