@@ -6,6 +6,8 @@
 
 #include <mpf/epics/dev_mpf.h>
 
+#include "epics/linear_conversion.h"
+
 namespace mpf {
 namespace {
 
@@ -28,9 +30,7 @@ class DevAoDac128v final : public DevMpf {
     return MPF_OK;
   }
   long convert(dbCommon* common, int) override {
-    auto* record = reinterpret_cast<aoRecord*>(common);
-    record->eslo = (record->eguf - record->egul) / kMaxCode;
-    record->eoff = record->egul;
+    setLinearConversion(*reinterpret_cast<aoRecord*>(common), 0, kMaxCode);
     return 0;
   }
   // MPF_NoConvert keeps the VAL of the database: the output is not known before the first write.

@@ -19,8 +19,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
-#include <epicsString.h>
 #include <longinRecord.h>
 #include <longoutRecord.h>
 #include <lsiRecord.h>
@@ -28,13 +26,13 @@
 #include <stdexcept>
 #include <stringinRecord.h>
 #include <stringoutRecord.h>
-#include <vector>
 
 #include <mpf/gpib_commands.h>
 
 #include "epics/common_fields.h"
 #include "epics/devices/string_parm/text_device.h"
 #include "epics/devices/string_parm/value_format.h"
+#include "epics/devices/text_fields.h"
 #include "epics/general/message_value.h"
 
 namespace mpf {
@@ -57,23 +55,12 @@ const char* reasonOf(std::int32_t status) noexcept {
   }
 }
 
-std::string translated(std::string_view text) {
-  std::vector<char> raw(text.size() + 1);
-  const auto size = epicsStrnRawFromEscaped(raw.data(), raw.size(), text.data(), text.size());
-  return {raw.data(), static_cast<std::size_t>(std::max(size, 0))};
-}
-
 // ---- the fields of each record type
 
 // Functions that store an answer return the reason if they cannot; nullptr: stored.
-const char* store(stringinRecord& record, const std::string& text) {
-  record.val[text.copy(record.val, sizeof record.val - 1)] = '\0';
-  return nullptr;
-}
-const char* store(lsiRecord& record, const std::string& text) {
-  const auto size = text.copy(record.val, std::size_t{record.sizv} - 1);
-  record.val[size] = '\0';
-  record.len = static_cast<epicsUInt32>(size + 1);
+template <class StringRecord>
+const char* store(StringRecord& record, const std::string& text) {
+  setValue(record, text);
   return nullptr;
 }
 constexpr const char* kDoesNotFit = "the value does not fit the record";
@@ -116,10 +103,10 @@ std::string inserted(std::string_view value, std::string format) {
   return format.replace(place, 2, value);
 }
 std::string printed(const stringoutRecord& record, const std::string& format) {
-  return inserted({record.val, ::strnlen(record.val, sizeof record.val)}, format);
+  return inserted(valueOf(record), format);
 }
 std::string printed(const lsoRecord& record, const std::string& format) {
-  return inserted({record.val, ::strnlen(record.val, record.sizv)}, format);
+  return inserted(valueOf(record), format);
 }
 
 template <class Record>
@@ -140,8 +127,7 @@ class GpibInput final : public TextDevice {
  private:
   long takeAnswer(dbCommon* common, TextAnswer answer) override {
     if (answer.status != gpib::gpibStatusOK) return fail(common, reasonOf(answer.status));
-    const auto end = answer.text.find_last_not_of("\r\n");
-    const std::string text(answer.text.substr(0, end + 1));
+    const std::string text(withoutLineEnd(answer.text));
     if (const auto* reason = store(*reinterpret_cast<Record*>(common), text))
       return fail(common, reason);
     common->udf = FALSE;

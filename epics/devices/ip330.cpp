@@ -17,6 +17,7 @@
 
 #include "base/number.h"
 #include "epics/common_fields.h"
+#include "epics/linear_conversion.h"
 
 namespace mpf {
 namespace {
@@ -53,9 +54,7 @@ class DevAiIp330Scan final : public DevMpf {
     return MPF_OK;
   }
   long convert(dbCommon* common, int) override {
-    auto* record = reinterpret_cast<aiRecord*>(common);
-    record->eslo = (record->eguf - record->egul) / kMaxCode;
-    record->eoff = record->egul;
+    setLinearConversion(*reinterpret_cast<aiRecord*>(common), 0, kMaxCode);
     return 0;
   }
   static long init(dbCommon* record) {

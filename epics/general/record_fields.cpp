@@ -9,6 +9,8 @@
 #include <menuConvert.h>
 #include <span>
 
+#include "epics/linear_conversion.h"
+
 namespace mpf::fields {
 namespace {
 
@@ -72,8 +74,7 @@ double adjusted(const Record& record, double number) {
 template <class Record>
 void setSlope(Record& record, const Options& options) {
   if (!options.range) return;
-  record.eslo = (record.eguf - record.egul) / (options.range->high - options.range->low);
-  record.eoff = record.egul - options.range->low * record.eslo;
+  setLinearConversion(record, options.range->low, options.range->high);
 }
 
 double engineeringOfRaw(aoRecord& record, std::int32_t raw) {

@@ -14,7 +14,6 @@
 #include <cstring>
 #include <dbFldTypes.h>
 #include <dbLink.h>
-#include <epicsString.h>
 #include <lsiRecord.h>
 #include <lsoRecord.h>
 #include <span>
@@ -24,34 +23,12 @@
 
 #include "epics/common_fields.h"
 #include "epics/devices/string_parm/text_device.h"
+#include "epics/devices/text_fields.h"
 
 namespace mpf {
 namespace {
 
 constexpr std::size_t kMaxText = 32767;  // as the longest VAL of lsi and lso
-
-std::string translated(std::string_view text) {
-  std::vector<char> raw(text.size() + 1);
-  const auto size = epicsStrnRawFromEscaped(raw.data(), raw.size(), text.data(), text.size());
-  return {raw.data(), static_cast<std::size_t>(std::max(size, 0))};
-}
-
-// ---- the VAL field of each record type
-
-std::string valueOf(const stringoutRecord& record) {
-  return {record.val, ::strnlen(record.val, sizeof record.val)};
-}
-std::string valueOf(const lsoRecord& record) {
-  return {record.val, ::strnlen(record.val, record.sizv)};
-}
-void setValue(stringinRecord& record, std::string_view text) {
-  record.val[text.copy(record.val, sizeof record.val - 1)] = '\0';
-}
-void setValue(lsiRecord& record, std::string_view text) {
-  const auto size = text.copy(record.val, std::size_t{record.sizv} - 1);
-  record.val[size] = '\0';
-  record.len = static_cast<epicsUInt32>(size + 1);
-}
 
 // A link of device support to a field; reading it is part of the processing of the record.
 class FieldLink {
@@ -90,8 +67,7 @@ class TextReader : public TextDevice {
  private:
   long takeAnswer(dbCommon* common, TextAnswer answer) final {
     if (answer.status != serial::serialServerStatusOK) return fail(common, reasonOf(answer.status));
-    const auto end = answer.text.find_last_not_of("\r\n");
-    setValue(*reinterpret_cast<Record*>(common), answer.text.substr(0, end + 1));
+    setValue(*reinterpret_cast<Record*>(common), withoutLineEnd(answer.text));
     common->udf = FALSE;
     return MPF_OK;
   }
