@@ -128,13 +128,13 @@ TEST_F(ExternalPeer, LeavesNothingBehindWhenItHangs) {
       "echo > /dev/shm/$name.left; mkdir -p /tmp/$name.left/folder; exec sleep 1000";
 
   const auto outcome = run("echo $$ > " + pid + ".server; echo ready; " + hang,
-                           "echo $$ > " + pid + ".requester; " + hang, std::chrono::seconds(2));
+                           "echo $$ > " + pid + ".requester; " + hang, std::chrono::seconds(5));
 
-  EXPECT_NE(outcome.error, "");
-  for (const std::string role : {"pid.server", "pid.requester"}) {
-    const bool wroteItsPid = !read(role).empty();
-    EXPECT_TRUE(!wroteItsPid || hasEnded(role)) << role;
-  }
+  EXPECT_THAT(outcome.error, HasSubstr("neither process ended within"));
+  ASSERT_NE(read("pid.server"), "") << "the server was not started in time";
+  EXPECT_TRUE(hasEnded("pid.server"));
+  // On a busy host the time may pass before the requester starts.
+  EXPECT_TRUE(read("pid.requester").empty() || hasEnded("pid.requester"));
   for (const std::string folder : {"/dev/shm/", "/tmp/"})
     EXPECT_FALSE(std::filesystem::exists(folder + options().name + ".left"));
 }
