@@ -40,8 +40,7 @@ void execute(membarrier_cmd command) noexcept {
   if (tryCommand(command)) return;
   printError(
       "mpf: membarrier() worked when this process started and is refused now: {}. Let the filter "
-      "of "
-      "system calls (seccomp) allow it, or install the filter before MPF is used.\n",
+      "of system calls (seccomp) allow it, or install the filter before MPF is used.\n",
       std::strerror(errno));
   std::abort();
 }

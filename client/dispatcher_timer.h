@@ -83,8 +83,8 @@ class DispatcherTimer {
  private:
   Endpoint& endpoint_;
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
-  std::atomic<std::uint64_t> waitingThread_{
-      0};  // threadNumber() of the one that waits, or waited last
+  // threadNumber() of the one that waits, or waited last
+  std::atomic<std::uint64_t> waitingThread_{0};
   std::mutex mutex_;  // guards the members below
   std::vector<Binding*> lowered_;
   bool hasLost_ = false;

@@ -3,7 +3,7 @@
 // interrupts and by polling.
 //
 //   ISR0, ISR1 ──┬─ the caller polls, for a short time ─┐
-//                └─ interrupt thread, while it sleeps ──┴──► events() ──► waitFor()
+//                └─ interrupt thread, while it sleeps ──┴──► poll(), waitFor()
 //
 //        ┌──────── setUp() ────────┐
 //        │                         ▼
@@ -35,7 +35,7 @@ namespace mpf {
 
 class Ti9914Chip {
  public:
-  // Bits of events(): those of ISR0, and those of ISR1 in the high byte.
+  // Bits of poll(): those of ISR0, and those of ISR1 in the high byte.
   enum Event : std::uint32_t {
     kEnd = ti9914::kEnd,
     kCanSend = ti9914::kBo,
@@ -59,7 +59,7 @@ class Ti9914Chip {
   // Sets up the chip.
   //   module            outlives this object
   //   onServiceRequest  called soon after the SRQ line has become active, on the thread of this
-  //                     object; it may call take() only
+  //                     object; it may call forget() only
   //   throws            IndustryPackError badVector; std::system_error when the thread or its
   //                     descriptor cannot be created
   Ti9914Chip(IndustryPackModule& module, const Options& options,

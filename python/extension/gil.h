@@ -27,8 +27,7 @@ class WithoutGil {
   WithoutGil& operator=(const WithoutGil&) = delete;
 
   // Returns a function that runs the signal handlers of Python, and returns true when one of them
-  // raised an exception,
-  // which is the current exception then. Valid as long as this object.
+  // raised an exception, which is the current exception then. Valid as long as this object.
   [[nodiscard]] std::function<bool()> interruption();
   [[nodiscard]] bool wasInterrupted() const noexcept { return wasInterrupted_; }
 

@@ -8,6 +8,7 @@
 #include "shm/shortage.h"
 
 namespace mpf::router {
+
 std::set<ServerName> PendingBinds::look() {
   const auto& backplane = backplane_.name();
   std::map<std::string, Known> known;

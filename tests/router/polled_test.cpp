@@ -32,7 +32,7 @@ TEST(PolledSet, PollsEachOnceInARound) {
   for (const auto& each : all) EXPECT_EQ(each.polls, 1);
 }
 
-TEST(PolledSet, DoesNotPollOneThatIsDestroyedInTheRound) {
+TEST(PolledSet, DoesNotPollOneThatIsRemovedInTheRound) {
   router::PolledSet set;
   Busy first(set);
   Busy second(set);

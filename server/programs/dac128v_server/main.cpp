@@ -34,8 +34,7 @@ struct Options {
     app.add_option_function<std::string>(
            "--ranges", [this](const std::string& text) { takeRanges(text); },
            "Output ranges of a model, as its jumpers select them: LOWtoHIGH for all channels, or "
-           "two "
-           "ranges for channels 0 to 3 and 4 to 7")
+           "two ranges for channels 0 to 3 and 4 to 7")
         ->default_str("-10to10,-10to10");
     hardware.addTo(app);
     arguments.addTo(app);

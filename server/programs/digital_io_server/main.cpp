@@ -73,8 +73,8 @@ int serve(int argc, char** argv) {
   const auto stop = [](void* outputs) noexcept {
     static_cast<mpf::MessageServer*>(outputs)->interrupt();
   };
-  const mpf::StopSignals signals(stop,
-                                 &server);  // before the first reply: a client may stop us then
+  // Before the first reply: a client may stop us then.
+  const mpf::StopSignals signals(stop, &server);
   mpf::logShortages(server, *log);
   const mpf::DigitalOutputServer outputs(server, io, log);
   mpf::ProgramFailure failure;

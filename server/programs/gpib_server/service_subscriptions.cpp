@@ -41,7 +41,7 @@ void ServiceSubscriptions::add(Char8ArrayMessage&& request, GpibAddress address)
     static_cast<void>(server_.reply(std::move(reply)));
     subscriptions_.push_back({std::move(request), client, address});
   }
-  followCount();
+  watchLineIfNeeded();
 }
 
 void ServiceSubscriptions::remove(GpibUser client, std::optional<GpibAddress> address) {
@@ -51,7 +51,7 @@ void ServiceSubscriptions::remove(GpibUser client, std::optional<GpibAddress> ad
       return subscription.client == client && (!address || subscription.address == *address);
     });
   }
-  followCount();
+  watchLineIfNeeded();
 }
 
 void ServiceSubscriptions::removeGone() {
@@ -62,10 +62,10 @@ void ServiceSubscriptions::removeGone() {
     });
     if (removed == 0) return;
   }
-  followCount();
+  watchLineIfNeeded();
 }
 
-void ServiceSubscriptions::followCount() {
+void ServiceSubscriptions::watchLineIfNeeded() {
   bool isEmpty = false;
   {
     const std::lock_guard lock(mutex_);

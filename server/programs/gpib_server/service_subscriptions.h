@@ -57,7 +57,7 @@ class ServiceSubscriptions {
 
   [[nodiscard]] std::vector<GpibAddress> instrumentsOf(GpibUser holder) const;
   void send(Subscription& subscription, std::uint8_t statusByte);
-  void followCount();
+  void watchLineIfNeeded();
 
   MessageServer& server_;
   GpibBus& bus_;
@@ -67,13 +67,14 @@ class ServiceSubscriptions {
   mutable std::mutex mutex_;
   std::vector<Subscription> subscriptions_;  // under mutex_
   std::atomic<bool> isRequested_{false};
+  // The server's thread; exists while there are subscriptions.
+  std::optional<GpibBus::Subscription> line_;
+  // The bus thread:
   GpibUser holder_ = 0;
   std::vector<GpibAddress> round_;  // still to be polled
   bool isFound_ = false;  // an instrument of this round requested service
-  Deadline noPollsBefore_ = Deadline::atNs(0);  // this and below: the bus thread
+  Deadline noPollsBefore_ = Deadline::atNs(0);
   std::chrono::milliseconds pause_{0};
-  std::optional<GpibBus::Subscription>
-      line_;  // the server's thread; exists while there are subscriptions
 };
 
 }  // namespace mpf

@@ -15,23 +15,23 @@
 namespace mpf {
 namespace {
 
-Ti9914Start readModule(OptionFields& words) {
+Ti9914Start readModule(OptionFields& fields) {
   Ti9914Start module;
-  module.place.name = words.word("module");
-  module.place.carrier = words.word("carrier");
-  module.place.site = words.word("site");
-  const int vector = words.number("vector", -1);
+  module.place.name = fields.word("module");
+  module.place.carrier = fields.word("carrier");
+  module.place.site = fields.word("site");
+  const int vector = fields.number("vector", -1);
   if (vector != -1) module.vector = vector;
   return module;
 }
 
-MeterStart readMeter(OptionFields& words) {
-  const int number = words.number("address");
+MeterStart readMeter(OptionFields& fields) {
+  const int number = fields.number("address");
   const auto address = GpibAddress::fromNumber(number);
   if (!address)
-    words.complain(fmt::format(
+    fields.complain(fmt::format(
         "{} is not a GPIB address: use 0 to 30, or 100 * primary + secondary address", number));
-  return {*address, words.word("wire", "")};
+  return {*address, fields.word("wire", "")};
 }
 
 MeterModel::Volts voltsOf(const MeterStart& meter, Hardware& hardware) {
@@ -59,13 +59,13 @@ std::unique_ptr<DeviceModel> makeModel(const Ti9914Options& options, const Ti991
 }  // namespace
 
 void Ti9914Options::addTo(CLI::App& app) {
-  addWords(app, "--ti9914", "MODULE,CARRIER,SITE[,VECTOR]",
-           "A GPIB controller on an Industry Pack module, GreenSpring IP-488",
-           [this](OptionFields& words) { modules.push_back(readModule(words)); });
-  addWords(app, "--meter", "ADDRESS[,WIRE]",
-           "On a model carrier: a voltmeter like the HP 3458A, which measures a wire of --wires; "
-           "default: one at 22, with simulated values",
-           [this](OptionFields& words) { meters.push_back(readMeter(words)); });
+  addFields(app, "--ti9914", "MODULE,CARRIER,SITE[,VECTOR]",
+            "A GPIB controller on an Industry Pack module, GreenSpring IP-488",
+            [this](OptionFields& fields) { modules.push_back(readModule(fields)); });
+  addFields(app, "--meter", "ADDRESS[,WIRE]",
+            "On a model carrier: a voltmeter like the HP 3458A, which measures a wire of --wires; "
+            "default: one at 22, with simulated values",
+            [this](OptionFields& fields) { meters.push_back(readMeter(fields)); });
 }
 
 const Ti9914Start* Ti9914Options::find(const std::string& module) const {

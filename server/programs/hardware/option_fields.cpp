@@ -15,14 +15,14 @@ OptionFields::OptionFields(std::string option, const std::string& text)
     : option_(std::move(option)), text_(text) {
   for (std::size_t at = 0; at <= text.size();) {
     const auto end = std::min(text.find(',', at), text.size());
-    words_.push_back(text.substr(at, end - at));
+    fields_.push_back(text.substr(at, end - at));
     at = end + 1;
   }
 }
 
 std::string OptionFields::word(const char* what) {
   if (!hasNext()) complain(fmt::format("{} is missing", what));
-  return words_[next_++];
+  return fields_[next_++];
 }
 
 std::string OptionFields::word(const char* what, std::string_view otherwise) {
@@ -58,23 +58,23 @@ int OptionFields::queueSize() {
 }
 
 void OptionFields::end() const {
-  if (next_ < words_.size()) complain(fmt::format("unexpected field \"{}\"", words_[next_]));
+  if (next_ < fields_.size()) complain(fmt::format("unexpected field \"{}\"", fields_[next_]));
 }
 
 void OptionFields::complain(const std::string& why) const {
   throw CLI::ValidationError(option_, fmt::format("{}: {}", text_, why));
 }
 
-CLI::Option* addWords(CLI::App& app, const std::string& option, const char* form, const char* help,
-                      const std::function<void(OptionFields&)>& take) {
+CLI::Option* addFields(CLI::App& app, const std::string& option, const char* form, const char* help,
+                       const std::function<void(OptionFields&)>& take) {
   return app
       .add_option_function<std::vector<std::string>>(
           option,
           [option, take](const std::vector<std::string>& texts) {
             for (const auto& text : texts) {
-              OptionFields words(option, text);
-              take(words);
-              words.end();
+              OptionFields fields(option, text);
+              take(fields);
+              fields.end();
             }
           },
           help)

@@ -2,10 +2,10 @@
 // OptionFields: the value of an option with several fields, "a-Ip330Scan,0,15,100,20", which are
 // read one after the other.
 //
-//   addWords(app, "--scan", "NAME[,FIRST[,QUEUE]]", "Adds a scan server", [this](auto& words) {
-//     auto name = words.word("name");
-//     const int first = words.number("first channel", 0);
-//     scans.push_back({name, first, words.queueSize()});
+//   addFields(app, "--scan", "NAME[,FIRST[,QUEUE]]", "Adds a scan server", [this](auto& fields) {
+//     auto name = fields.word("name");
+//     const int first = fields.number("first channel", 0);
+//     scans.push_back({name, first, fields.queueSize()});
 //   });
 //
 // A field that is missing or empty has its default, if it has one. Errors are CLI::ValidationErrors
@@ -47,17 +47,17 @@ class OptionFields {
   [[noreturn]] void complain(const std::string& why) const;
 
  private:
-  [[nodiscard]] bool hasNext() const { return next_ < words_.size() && !words_[next_].empty(); }
+  [[nodiscard]] bool hasNext() const { return next_ < fields_.size() && !fields_[next_].empty(); }
   std::string option_;
   std::string text_;
-  std::vector<std::string> words_;
+  std::vector<std::string> fields_;
   std::size_t next_ = 0;
 };
 
 // Adds an option that may be given more than once; `take` reads the fields of each. `app` must not
 // outlive what `take` refers to.
 //   form  "NAME[,FIRST[,LAST]]", for --help
-CLI::Option* addWords(CLI::App& app, const std::string& option, const char* form, const char* help,
-                      const std::function<void(OptionFields&)>& take);
+CLI::Option* addFields(CLI::App& app, const std::string& option, const char* form, const char* help,
+                       const std::function<void(OptionFields&)>& take);
 
 }  // namespace mpf

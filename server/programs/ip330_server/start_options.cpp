@@ -15,9 +15,9 @@ namespace {
 
 constexpr int kLeftOut = std::numeric_limits<int>::min();
 
-int notNegative(const OptionFields& words, const char* what, int value) {
+int notNegative(const OptionFields& fields, const char* what, int value) {
   if (value < 0 && value != kLeftOut)
-    words.complain(fmt::format("{} {}: use 0 or more", what, value));
+    fields.complain(fmt::format("{} {}: use 0 or more", what, value));
   return value;
 }
 
@@ -75,49 +75,50 @@ void Ip330StartOptions::addBoard(CLI::App& app) {
 }
 
 void Ip330StartOptions::addServers(CLI::App& app) {
-  addWords(
+  addFields(
       app, "--scan", "NAME[,FIRST,LAST[,MS[,QUEUE]]]",
       "Adds a server of mean values; MS: averaging time of requests without one, 0: since the last "
       "request",
-      [this](OptionFields& words) {
-        auto name = words.word("name");
+      [this](OptionFields& fields) {
+        auto name = fields.word("name");
         const int first =
-            notNegative(words, "first channel", words.number("first channel", kLeftOut));
+            notNegative(fields, "first channel", fields.number("first channel", kLeftOut));
         const int last = first == kLeftOut
-                             ? words.number("last channel", kLeftOut)
-                             : notNegative(words, "last channel", words.number("last channel"));
-        const int average = notNegative(words, "averaging time", words.number("averaging time", 0));
-        scans.push_back({std::move(name), first, last, average, words.queueSize()});
+                             ? fields.number("last channel", kLeftOut)
+                             : notNegative(fields, "last channel", fields.number("last channel"));
+        const int average =
+            notNegative(fields, "averaging time", fields.number("averaging time", 0));
+        scans.push_back({std::move(name), first, last, average, fields.queueSize()});
       });
-  addWords(app, "--config", "NAME[,QUEUE]", "Adds a server for calibration and scan mode",
-           [this](OptionFields& words) {
-             auto name = words.word("name");
-             configs.push_back({std::move(name), words.queueSize()});
-           });
-  addWords(app, "--sweep", "NAME,FIRST,LAST,POINTS[,QUEUE]", "Adds a server of arrays over time",
-           [this](OptionFields& words) {
-             auto name = words.word("name");
-             const int first = words.number("first channel");
-             const int last = words.number("last channel");
-             const int points = words.number("points");
-             sweeps.push_back({std::move(name), first, last, points, words.queueSize()});
-           });
-  addWords(
+  addFields(app, "--config", "NAME[,QUEUE]", "Adds a server for calibration and scan mode",
+            [this](OptionFields& fields) {
+              auto name = fields.word("name");
+              configs.push_back({std::move(name), fields.queueSize()});
+            });
+  addFields(app, "--sweep", "NAME,FIRST,LAST,POINTS[,QUEUE]", "Adds a server of arrays over time",
+            [this](OptionFields& fields) {
+              auto name = fields.word("name");
+              const int first = fields.number("first channel");
+              const int last = fields.number("last channel");
+              const int points = fields.number("points");
+              sweeps.push_back({std::move(name), first, last, points, fields.queueSize()});
+            });
+  addFields(
       app, "--pid", "NAME,CHANNEL,DAC,DACCHANNEL[,QUEUE]",
       "Adds a server of fast feedback from a channel to a channel of a --dac",
-      [this](OptionFields& words) {
-        auto name = words.word("name");
-        const int channel = words.number("channel");
-        auto dac = words.word("name of the DAC");
-        const int dacChannel = words.number("DAC channel");
-        pids.push_back({std::move(name), channel, std::move(dac), dacChannel, words.queueSize()});
+      [this](OptionFields& fields) {
+        auto name = fields.word("name");
+        const int channel = fields.number("channel");
+        auto dac = fields.word("name of the DAC");
+        const int dacChannel = fields.number("DAC channel");
+        pids.push_back({std::move(name), channel, std::move(dac), dacChannel, fields.queueSize()});
       });
-  addWords(app, "--dac", "MODULE,CARRIER,SITE", "Opens a DAC128V for --pid",
-           [this](OptionFields& words) {
-             auto name = words.word("module");
-             auto carrier = words.word("carrier");
-             dacs.push_back({std::move(name), std::move(carrier), words.word("site")});
-           });
+  addFields(app, "--dac", "MODULE,CARRIER,SITE", "Opens a DAC128V for --pid",
+            [this](OptionFields& fields) {
+              auto name = fields.word("module");
+              auto carrier = fields.word("carrier");
+              dacs.push_back({std::move(name), std::move(carrier), fields.word("site")});
+            });
 }
 
 void Ip330StartOptions::takeAll() {

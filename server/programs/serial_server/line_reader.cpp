@@ -61,15 +61,15 @@ bool LineReader::tryContinue(bool mayBeLate) {
   return continues_;
 }
 
-LineReader::Sync LineReader::getInStep(bool isQuestion, Deadline until,
-                                       const std::function<bool()>& isAbandoned) {
+LineReader::Sync LineReader::waitUntilSynchronized(bool isQuestion, Deadline until,
+                                                   const std::function<bool()>& isAbandoned) {
   std::unique_lock lock(mutex_);
   dropLateAnswer();
   phase_ = isQuestion ? Phase::syncing : Phase::idle;
   if (isQuestion && !std::exchange(input_, {}).empty()) noteSurplus();
   for (;;) {
     const auto readyAt = Deadline::atNs(sync_.readyAtNs(isQuestion));
-    if (readyAt.hasPassed()) return Sync::inStep;
+    if (readyAt.hasPassed()) return Sync::synchronized;
     const bool isLate = until.hasPassed();
     lock.unlock();
     const bool isOver = isLate || isAbandoned();
@@ -171,15 +171,15 @@ void LineReader::dropOldestByte() {
 void LineReader::noteSurplus() {
   if (sync_.isSurplusExpected()) return;
   sync_.noteSurplus();
-  if (!std::exchange(isSurplusTold_, true) && onSurplus_) onSurplus_();
+  if (!std::exchange(isSurplusReported_, true) && onSurplus_) onSurplus_();
 }
 
 ByteHandlerResult LineReader::readBegins() {
   const std::lock_guard lock(mutex_);
   if (isQuestion_ && !continues_) {
     if (!std::exchange(input_, {}).empty()) noteSurplus();
-    // The port has passed on all bytes that had arrived; some may have arrived after getInStep()
-    // saw the silence.
+    // The port has passed on all bytes that had arrived; some may have arrived after
+    // waitUntilSynchronized() saw the silence.
     answer_.wasDisturbed = !Deadline::atNs(sync_.readyAtNs(true)).hasPassed();
     phase_ = answer_.wasDisturbed ? Phase::idle : Phase::armed;
     return answer_.wasDisturbed ? ByteHandlerResult::error : ByteHandlerResult::ok;
@@ -193,7 +193,7 @@ ByteHandlerResult LineReader::readBegins() {
 void LineReader::sendBegins() {
   const std::lock_guard lock(mutex_);
   phase_ = Phase::reading;
-  isSurplusTold_ = false;
+  isSurplusReported_ = false;
   sync_.asked(eom_, maxBytes_);
 }
 

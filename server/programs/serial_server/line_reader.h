@@ -7,7 +7,7 @@
 //
 //   read        (cmd 1)   may begin with what was received before it: the circular buffer; its
 //                         retry continues a read that ended with a timeout
-//   write-read  (cmd 3)   getInStep() ─► port.writeRead() ─► takeAnswer()
+//   write-read  (cmd 3)   waitUntilSynchronized() ─► port.writeRead() ─► takeAnswer()
 //                         nothing that arrived before its first byte was sent is in its answer
 //
 // Threads  the port calls byteReceived, readBegins, sendBegins, readEnds and lineFailed; the
@@ -59,13 +59,14 @@ class LineReader final : public ByteHandler {
   [[nodiscard]] bool tryContinue(bool mayBeLate);
 
   enum class Sync {
-    inStep,  // the request may be sent now
+    synchronized,  // the request may be sent now
     noSilence,  // `until` has passed
     abandoned,  // isAbandoned() returned true
   };
   // Waits until a request may be sent. Before a write-read it drops the input, and the bytes that
   // arrive while it waits.
-  Sync getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isAbandoned);
+  Sync waitUntilSynchronized(bool isQuestion, Deadline until,
+                             const std::function<bool()>& isAbandoned);
   // A plain write has ended.
   void noteWritten();
 
@@ -115,7 +116,7 @@ class LineReader final : public ByteHandler {
   bool mayBeLate_ = false;
   bool continues_ = false;
   bool flush_ = false;
-  bool isSurplusTold_ = false;
+  bool isSurplusReported_ = false;
   std::size_t maxBytes_ = 0;
   std::size_t returnedBytes_ = 0;  // while collecting a late answer: the reply had these
   MarkedInput input_;

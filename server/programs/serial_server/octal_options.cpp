@@ -12,40 +12,40 @@ namespace {
 constexpr const char* kUartForm = "MODULE,CARRIER,SITE,NPORTS[,VECTOR]";
 constexpr const char* kPortForm = "PORT,MODULE,N[,BAUD[,PARITY[,STOPBITS[,BITS[,FLOW]]]]]";
 
-OctalUartStart readUart(OptionFields& words) {
+OctalUartStart readUart(OptionFields& fields) {
   OctalUartStart uart;
-  uart.place.name = words.word("module");
-  uart.place.carrier = words.word("carrier");
-  uart.place.site = words.word("site");
-  uart.ports = words.number("number of ports");
-  const int vector = words.number("vector", -1);
+  uart.place.name = fields.word("module");
+  uart.place.carrier = fields.word("carrier");
+  uart.place.site = fields.word("site");
+  uart.ports = fields.number("number of ports");
+  const int vector = fields.number("vector", -1);
   if (vector != -1) uart.vector = vector;
   return uart;
 }
 
-OctalPortStart readPort(OptionFields& words) {
+OctalPortStart readPort(OptionFields& fields) {
   OctalPortStart port;
-  port.name = words.word("port");
-  port.module = words.word("module");
-  port.number = words.number("number of the port");
+  port.name = fields.word("port");
+  port.module = fields.word("module");
+  port.number = fields.number("number of the port");
   auto& settings = port.settings;
-  settings.baud = words.number("baud rate", settings.baud);
-  settings.parity = words.letter("parity", settings.parity);
-  settings.stopBits = words.number("stop bits", settings.stopBits);
-  settings.bitsPerChar = words.number("bits per character", settings.bitsPerChar);
-  settings.flowControl = words.letter("flow control", settings.flowControl);
+  settings.baud = fields.number("baud rate", settings.baud);
+  settings.parity = fields.letter("parity", settings.parity);
+  settings.stopBits = fields.number("stop bits", settings.stopBits);
+  settings.bitsPerChar = fields.number("bits per character", settings.bitsPerChar);
+  settings.flowControl = fields.letter("flow control", settings.flowControl);
   return port;
 }
 
 }  // namespace
 
 void OctalOptions::addTo(CLI::App& app) {
-  addWords(app, "--octal-uart", kUartForm,
-           "A module of serial ports; one process must serve all its ports",
-           [this](OptionFields& words) { uarts.push_back(readUart(words)); });
-  addWords(app, "--octal-port", kPortForm,
-           "A port of such a module, to be used as PORT; default settings: 9600,N,1,8,N",
-           [this](OptionFields& words) { ports.push_back(readPort(words)); });
+  addFields(app, "--octal-uart", kUartForm,
+            "A module of serial ports; one process must serve all its ports",
+            [this](OptionFields& fields) { uarts.push_back(readUart(fields)); });
+  addFields(app, "--octal-port", kPortForm,
+            "A port of such a module, to be used as PORT; default settings: 9600,N,1,8,N",
+            [this](OptionFields& fields) { ports.push_back(readPort(fields)); });
   app.add_option_function<std::string>(
          "--octal-model",
          [this](const std::string& kind) {

@@ -269,8 +269,9 @@ bool SerialServer::takeAnswer(Work& work, SerialPortStatus status) {
 }
 
 bool SerialServer::isInStep(Work& work, bool isQuestion, Deadline until) {
-  const auto sync = reader_.getInStep(isQuestion, std::min(until, work.until), work.isAbandoned);
-  if (sync == LineReader::Sync::inStep) return true;
+  const auto sync =
+      reader_.waitUntilSynchronized(isQuestion, std::min(until, work.until), work.isAbandoned);
+  if (sync == LineReader::Sync::synchronized) return true;
   work.status = serialServerStatusError;
   work.answer.clear();
   if (sync == LineReader::Sync::noSilence)

@@ -42,24 +42,24 @@ std::optional<std::string> tryReadEom(const std::string& text) {
 }
 
 // Checks the fields as the positional arguments are checked.
-SerialServerStart readServer(OptionFields& words) {
+SerialServerStart readServer(OptionFields& fields) {
   SerialServerStart start;
-  start.server = words.word("server");
-  start.port = words.word("port");
+  start.server = fields.word("server");
+  start.port = fields.word("port");
   const int bufferBytes =
-      words.number("longest answer", static_cast<int>(start.serial.bufferBytes));
+      fields.number("longest answer", static_cast<int>(start.serial.bufferBytes));
   if (bufferBytes < 1 || bufferBytes > kLongestAnswer)
-    words.complain(
+    fields.complain(
         fmt::format("longest answer {}: use 1 to {} bytes", bufferBytes, kLongestAnswer));
   start.serial.bufferBytes = static_cast<std::size_t>(bufferBytes);
-  start.queueSize = words.queueSize();
-  const auto eom = words.word("end of message", "\\r");
+  start.queueSize = fields.queueSize();
+  const auto eom = fields.word("end of message", "\\r");
   const auto bytes = tryReadEom(eom);
   if (!bytes)
-    words.complain(
+    fields.complain(
         fmt::format("end of message {}: use 1 or 2 bytes, with escapes as in C, or none", eom));
   start.serial.eom = *bytes;
-  start.serial.circularBuffer = words.number("circular", 1) != 0;
+  start.serial.circularBuffer = fields.number("circular", 1) != 0;
   return start;
 }
 
@@ -127,11 +127,11 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
   app.add_option("circular", first.serial.circularBuffer,
                  "1: keep bytes that are received while no request reads; 0: drop them")
       ->capture_default_str();
-  addWords(
+  addFields(
       app, "--server", kServerForm,
       "Adds a server, with the fields of the arguments above; an empty field has its default; may "
       "be repeated",
-      [&others](OptionFields& words) { others.push_back(readServer(words)); });
+      [&others](OptionFields& fields) { others.push_back(readServer(fields)); });
   const std::array ofTerminals{
       app.add_option("--baud", settings.baud, "Speed of terminal devices [bit/s]")
           ->capture_default_str(),

@@ -35,12 +35,12 @@ class LineReaderTest : public testing::Test {
   // Begins a write-read and sends its question, as the port does.
   void ask(bool mayBeLate = false) {
     reader_.prepareQuestion(0, mayBeLate);
-    EXPECT_EQ(getInStep(), LineReader::Sync::inStep);
+    EXPECT_EQ(waitUntilSynchronized(), LineReader::Sync::synchronized);
     EXPECT_EQ(reader_.readBegins(), ByteHandlerResult::ok);
     reader_.sendBegins();
   }
-  LineReader::Sync getInStep() {
-    return reader_.getInStep(true, Deadline::never(), [] { return false; });
+  LineReader::Sync waitUntilSynchronized() {
+    return reader_.waitUntilSynchronized(true, Deadline::never(), [] { return false; });
   }
   LineReader::Answer end(SerialPortStatus status = SerialPortStatus::success) {
     reader_.readEnds(status);
@@ -179,7 +179,7 @@ TEST_F(LineReaderTest, InputThatNoRequestReadsIsReportedOnceAfterEachWriteRead) 
     EXPECT_EQ(surplus_, asked - 1);
 
     receive("b\r");
-    EXPECT_EQ(getInStep(), LineReader::Sync::inStep);
+    EXPECT_EQ(waitUntilSynchronized(), LineReader::Sync::synchronized);
     receive("c\r");
 
     EXPECT_EQ(surplus_, asked);
@@ -188,7 +188,7 @@ TEST_F(LineReaderTest, InputThatNoRequestReadsIsReportedOnceAfterEachWriteRead) 
 
 TEST_F(LineReaderTest, InputBeforeTheFirstByteStopsAWriteRead) {
   reader_.prepareQuestion(0, false);
-  ASSERT_EQ(getInStep(), LineReader::Sync::inStep);
+  ASSERT_EQ(waitUntilSynchronized(), LineReader::Sync::synchronized);
   ASSERT_EQ(reader_.readBegins(), ByteHandlerResult::ok);
 
   EXPECT_EQ(receive("x"), ByteHandlerResult::error);
@@ -314,13 +314,13 @@ TEST(LineReaderSync, WaitsForSilenceUntilItsDeadlineOrTheEndOfItsClient) {
   LineReader reader(kBufferBytes, "\r", true, {.settleTime = 1h, .quietTime = 1h});
   reader.byteReceived('x');
 
-  EXPECT_EQ(reader.getInStep(false, Deadline::never(), [] { return true; }),
-            LineReader::Sync::inStep)
+  EXPECT_EQ(reader.waitUntilSynchronized(false, Deadline::never(), [] { return true; }),
+            LineReader::Sync::synchronized)
       << "a plain write needs no silence";
   reader.prepareQuestion(0, false);
-  EXPECT_EQ(reader.getInStep(true, Deadline::atNs(0), [] { return false; }),
+  EXPECT_EQ(reader.waitUntilSynchronized(true, Deadline::atNs(0), [] { return false; }),
             LineReader::Sync::noSilence);
-  EXPECT_EQ(reader.getInStep(true, Deadline::never(), [] { return true; }),
+  EXPECT_EQ(reader.waitUntilSynchronized(true, Deadline::never(), [] { return true; }),
             LineReader::Sync::abandoned);
 }
 
