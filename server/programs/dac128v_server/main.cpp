@@ -57,11 +57,7 @@ struct Options {
 int serve(int argc, char** argv) {
   Options options;
   mpf::Hardware hardware;
-  if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
-  if (options.arguments.checkOnly) {
-    hardware.check(options.place);
-    return 0;
-  }
+  if (const auto exit = mpf::parseOrCheck(options, hardware, argc, argv)) return *exit;
   const auto& arguments = options.arguments;
   const mpf::ServerLog log(kProgram, arguments.logLevel);
   auto* const module = hardware.open(

@@ -43,11 +43,7 @@ void describe(const mpf::DigitalIo& io, const mpf::IndustryPackModule& module,
 int serve(int argc, char** argv) {
   mpf::DigitalIoStartOptions options;
   mpf::Hardware hardware;
-  if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
-  if (options.arguments.checkOnly) {
-    hardware.check(options.place);
-    return 0;
-  }
+  if (const auto exit = mpf::parseOrCheck(options, hardware, argc, argv)) return *exit;
   const auto& arguments = options.arguments;
   const auto& name = options.place.name;
   const mpf::ServerLog log(kProgram, arguments.logLevel);

@@ -21,6 +21,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -108,6 +109,19 @@ class Hardware {
   IndustryPackCarriers carriers_;
   IndustryPackModules modules_;
 };
+
+// Parses the command line of a program that drives one module. With --check, checks its place, and
+// the program ends.
+//   returns  the exit status of a program that ends now
+//   throws   what Hardware::check() throws
+template <class Options>
+[[nodiscard]] std::optional<int> parseOrCheck(Options& options, Hardware& hardware, int argc,
+                                              char** argv) {
+  if (const auto exit = options.parse(argc, argv, hardware)) return exit;
+  if (!options.arguments.checkOnly) return std::nullopt;
+  hardware.check(options.place);
+  return 0;
+}
 
 // Logs what `server` serves, and serves until SIGINT or SIGTERM. Returns the exit status of the
 // program.

@@ -51,11 +51,7 @@ std::unique_ptr<mpf::Ip440Model> makeModel(const Options& options, mpf::ModelWir
 int serve(int argc, char** argv) {
   Options options;
   mpf::Hardware hardware;
-  if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
-  if (options.arguments.checkOnly) {
-    hardware.check(options.place);
-    return 0;
-  }
+  if (const auto exit = mpf::parseOrCheck(options, hardware, argc, argv)) return *exit;
   const mpf::ServerLog log(kProgram, options.arguments.logLevel);
   auto* const module = hardware.open(
       options.place, mpf::Ip440::kind(), [&] { return makeModel(options, hardware.wires()); }, log);
