@@ -11,6 +11,8 @@
 //     cmdReadBits    address=mask              cmdReadBits      address=mask
 //     cmdReadBits16  address=mask extra=bit    cmdReadBits16    address=mask extra=bit
 //
+// mpf-ip440-server has one server, with the name of the module: cmdReadBits and cmdReadBits16 only.
+//
 // A monitor:
 //
 //   client                      server <module>In

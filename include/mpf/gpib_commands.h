@@ -5,7 +5,8 @@
 //             address: the instrument: 0 to 30, or 100 * primary + secondary address
 //             value = bytes to write, commands, or a name
 //             extra: longest read [bytes], or what the command says
-//             eomLen, eomString: a read ends at the last byte of eomString; eomLen 0: at no byte
+//             eomLen, eomString: a read ends at the first byte that is equal to the last byte of
+//             eomString, which is the only one that is used; eomLen 0: no such byte
 //             timeout [s], or [ms] with cmdTimeoutMilliseconds: the wait for the bus and the
 //             operation together, from the arrival of the request; 0: the server's default
 //   reply     status = gpibStatus..., extra = gpibReadEnded... of a read, value = bytes that were
@@ -79,10 +80,10 @@ inline constexpr std::int32_t cmdLeaseHolder = 14;
 
 // From now on, when the instrument requests service, the server polls it and sends an OutOfBand
 // message with cmd = cmdSubscribe, address, and value = status byte. extra = number of such
-// messages that are missing before, because this client did not take them in time. The same message
-// is sent when a cmdSerialPoll of any client returns a status byte that requests service. Does not
-// wait for the bus. During a lease, the server polls only instruments to which the holder
-// subscribes.
+// messages that were dropped before this one, because this client did not take the earlier ones in
+// time. The same message is sent when a cmdSerialPoll of any client returns a status byte that
+// requests service. Does not wait for the bus. During a lease, the server polls only instruments to
+// which the holder subscribes.
 inline constexpr std::int32_t cmdSubscribe = 15;
 // Ends the subscription of this client to `address`; allInstruments: all its subscriptions.
 inline constexpr std::int32_t cmdUnsubscribe = 16;

@@ -3,7 +3,8 @@
 // invalid `cmd`, channel or value gets status -1.
 //
 //   server   request                                        reply
-//   scan     Int32 address=channel value=gain code 0 to 3   Int32 value=0 to 0xffff, status
+//   scan     Int32 address=channel                          Int32 value=0 to 0xffff, status
+//            value=gain code 0 to 3, for gain 1, 2, 4, 8
 //            extra=averaging time [ms], 0: the server's default
 //   config   Int32 cmd, value                               Int32 status; value as below
 //   sweep    Float64 cmd, address=channel, value            Float64; arrays as below
@@ -34,8 +35,9 @@ inline constexpr std::int32_t cmdSetMicrosecondsPerScan = 3;
 // Starts a scan in the single modes; status -1 in the other modes.
 inline constexpr std::int32_t cmdStartConvert = 4;
 
-// `cmd` of the sweep server, with the numbers of mca.h. The server accepts commands that have no
-// meaning for a sweep, and ignores them.
+// `cmd` of the sweep server, with the numbers of mca.h. The server ignores
+// msgSetChannelAdvance..., msgSetCounts, msgSetLoChan, msgSetHiChan, msgSetNSweeps, msgSetMode...,
+// msgSetSeq and msgSetPscl, with status 0.
 inline constexpr std::int32_t msgAcquire = 0;
 // The reply is an Int32Array: all points of the channel.
 inline constexpr std::int32_t msgRead = 1;
@@ -43,6 +45,7 @@ inline constexpr std::int32_t msgSetChannelAdvanceInternal = 2;
 inline constexpr std::int32_t msgSetChannelAdvanceExternal = 3;
 inline constexpr std::int32_t msgSetNChan = 4;  // number of points
 inline constexpr std::int32_t msgSetDwell = 5;  // [s] per point
+// Both set the time after which a sweep ends [s]; 0: no limit.
 inline constexpr std::int32_t msgSetRealTime = 6;
 inline constexpr std::int32_t msgSetLiveTime = 7;
 inline constexpr std::int32_t msgSetCounts = 8;
@@ -60,7 +63,9 @@ inline constexpr std::int32_t msgErase = 17;
 inline constexpr std::int32_t msgSetSeq = 18;
 inline constexpr std::int32_t msgSetPscl = 19;
 
-// `cmd` of the PID server.
+// `cmd` of the PID server. Set point, actual value and error are in counts of the IP330 (0 to
+// 65535); output, P, I, D and the limits are codes of the DAC128V (0 to 4095). KI is in 1/s, KD in
+// s.
 inline constexpr std::int32_t cmdStartFeedback = 0;
 inline constexpr std::int32_t cmdStopFeedback = 1;
 inline constexpr std::int32_t cmdSetHighLimit = 2;

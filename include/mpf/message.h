@@ -80,8 +80,8 @@ class Message {
 
   // False for an empty handle: default constructed, moved from, sent, or reset().
   explicit operator bool() const noexcept { return state_.type != MessageType::none; }
-  // MessageType::none for an empty handle. A received message may have a number that this program
-  // does not have; then isSound() is false.
+  // MessageType::none for an empty handle. A received message may have a type that this program
+  // does not know; then isSound() is false.
   [[nodiscard]] MessageType getType() const noexcept { return state_.type; }
 
   // Two numbers of the client's own choice, any value, 0 by default. The client sets them before

@@ -65,7 +65,7 @@ enum class ConnectStatus : std::int32_t {
   // A queue was full and refused a message, here or on the host of the server. The client stays
   // connected; a run of refusals is reported once.
   connectQueueFull = 2,
-  // The server has its maximum number of clients; the client tries again every second.
+  // The server has 16384 clients, the maximum; the client tries again every second.
   connectRefused = 3,
 };
 // Indexed by the value of the status.
@@ -126,8 +126,9 @@ BytesField(std::string_view, std::array<char, room> Body::*, std::int32_t Body::
 // deadline of MessageClient::send() does. Each field, and the end that writes it:
 //   timeout   client  how long the server may wait for its device, in seconds by convention
 //   cmd       client  a command; servers declare theirs in a header such as <mpf/serial_commands.h>
-//   status    server  of a reply, 0 by convention when the request succeeded; the servers of MPF
-//                     reply -1 to a request of a type that they do not handle
+//   status    server  of a reply, 0 by convention when the request succeeded; the device servers of
+//                     MPF reply -1 to a request of a type that they do not handle, or refuse it if
+//                     the type has no status
 //   address   client  for example the channel
 //   extra     both    anything else
 template <class Body>

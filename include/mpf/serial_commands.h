@@ -2,7 +2,9 @@
 // The commands and statuses of serial servers. Client and server exchange Char8Array messages:
 //
 //   request   cmd = command | options, value = bytes to write
-//             timeout [s], or [ms] with cmdTimeoutMilliseconds: longest wait for the line
+//             timeout [s], or [ms] with cmdTimeoutMilliseconds: longest time that the instrument
+//             may take, without the wait for earlier requests; 0: a read returns the bytes that
+//             were received before
 //             extra > 0: read at most `extra` bytes
 //             numberRetrys: how often a request that failed is repeated; a read is repeated only
 //             after a timeout, and keeps the bytes of its earlier attempts

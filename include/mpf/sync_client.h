@@ -58,7 +58,8 @@ class Answer {
   std::optional<Fate> fate_;
   std::optional<SendResult> refusal_;
   std::string details_;
-  MessageType expected_ = MessageType::none;  // that the reply has not
+  // The type that as() requested, if the reply has another one.
+  MessageType expected_ = MessageType::none;
 };
 
 class SyncClient {
@@ -79,8 +80,8 @@ class SyncClient {
   //             the name, until `timeout`
   Answer call(Message&& message, Nanoseconds timeout, Retry retry = Retry::never);
   // Waits for a message that is not the first reply to a call: a further reply, for example of a
-  // monitor, or an OutOfBand message. call() stores such messages until receive() returns them, in
-  // their order. Returns an empty handle after `timeout`.
+  // subscription, or an OutOfBand message. call() stores such messages until receive() returns
+  // them, in their order. Returns an empty handle after `timeout`.
   Message receive(Nanoseconds timeout);
 
   // Waits until the client is connected; returns false after `timeout`.
