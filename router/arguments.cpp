@@ -20,7 +20,7 @@ namespace {
 constexpr const char* kProgram = "mpf-router";
 constexpr const char* kFooter =
     "Examples: mpf-router /etc/mpf/router.toml\n"
-    "          mpf-router --serve 1 --listen 10.0.0.7:9900 --plain     on the host of the servers\n"
+    "          mpf-router --serve 1=0 --listen 10.0.0.7:9900 --plain   on the host of the servers\n"
     "          mpf-router --remote 1=10.0.0.7:9900 --plain             on the host of the clients\n"
     "SIGHUP reloads the file; connections whose entries are unchanged continue.\n"
     "Exit status: 0 stopped by SIGINT or SIGTERM; 1 failed; 2 usage error, or an error in the "

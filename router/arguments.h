@@ -3,7 +3,7 @@
 // or options describe a simple one:
 //
 //   mpf-router /etc/mpf/router.toml
-//   mpf-router --serve 1 --listen 10.0.0.7:9900 --plain
+//   mpf-router --serve 1=0 --listen 10.0.0.7:9900 --plain
 //   mpf-router --remote 1,2=ioc1.lab:9900
 //     --tls-certificate our.pem --tls-key our.key --tls-authorities lab.pem
 //

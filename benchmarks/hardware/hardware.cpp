@@ -95,7 +95,7 @@ Measurement rowOf(const std::shared_ptr<HardwareServers>& servers, const std::st
 
 void addOptions(CLI::App& app, HardwareOptions& options) {
   addOptions(app, static_cast<Options&>(options));
-  addWaitOption(app, options.wait);
+  addWaitOption(app, options.wait)->description("How MPF servers and clients wait; not spin");
   app.callback([&options] {
     if (options.wait == Mode::spin) throw CLI::ValidationError("--wait", kWhyNotSpin);
   });

@@ -114,12 +114,13 @@ void addOptions(CLI::App& app, Options& options) {
       "Measure only rows whose name contains one of these, and the floors that they need");
 }
 
-void addWaitOption(CLI::App& app, Mode& wait) {
+CLI::Option* addWaitOption(CLI::App& app, Mode& wait) {
   static const std::map<std::string, Mode> modes{
       {"adaptive", Mode::adaptive}, {"block", Mode::block}, {"spin", Mode::spin}};
-  app.add_option_function<std::string>(
-         "--wait", [&wait](const std::string& name) { wait = modes.at(name); },
-         "How MPF servers and clients wait: spin is not for hardware")
+  return app
+      .add_option_function<std::string>(
+          "--wait", [&wait](const std::string& name) { wait = modes.at(name); },
+          "How MPF servers and clients wait")
       ->check(CLI::IsMember({"adaptive", "block", "spin"}))
       ->default_str("adaptive");
 }

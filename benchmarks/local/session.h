@@ -17,7 +17,8 @@
 
 namespace CLI {  // NOLINT(readability-identifier-naming): a library's name
 class App;
-}
+class Option;
+}  // namespace CLI
 
 namespace mpf::bench {
 
@@ -35,7 +36,7 @@ struct Options {
 // Adds --quick, --list, --json, --cpus and --only.
 void addOptions(CLI::App& app, Options& options);
 // Adds --wait.
-void addWaitOption(CLI::App& app, Mode& wait);
+CLI::Option* addWaitOption(CLI::App& app, Mode& wait);
 
 // The duration of the rows, and the number of rounds of each row.
 struct Pace {

@@ -148,8 +148,9 @@ int run(const Options& options) {
 
 int demo(int argc, char** argv) {
   Options options;
-  CLI::App app("mpf-demo - a client of the servers that demo/hardware starts: draws their values",
-               "mpf-demo");
+  CLI::App app(
+      "mpf-demo - a client of the servers that examples/demo/hardware starts: draws their values",
+      "mpf-demo");
   app.add_option("--backplane", options.backplane,
                  "Backplane; default: $MPF_BACKPLANE, or \"default\"");
   mpf::addTime(app, "--seconds", options.duration,

@@ -104,7 +104,7 @@ constexpr std::array<Limit, 10> kLimits{{
     numberLimit<&Limits::maxConnections>("max-connections", "Accepted connections", Kind::count, 1,
                                          100'000),
     timeLimit<&Limits::deadTime>(
-        "dead-time", "A connection without a sign of life for this time is closed", 100),
+        "dead-time", "A connection on which nothing arrives for this time is closed", 100),
     timeLimit<&Limits::handshakeTime>(
         "handshake-time", "Longest time for a peer's TLS handshake, and then for its greeting",
         100),

@@ -175,7 +175,8 @@ int inspectNamed(const InspectArguments& arguments) {
       });
   for (const auto& name : selection.missing()) {
     printError(
-        "mpf inspect: no server, client, link or router \"{}\"; `mpf inspect` lists all of them\n",
+        "mpf inspect: no server, client, link or router \"{}\"; `mpf inspect --json` lists all of "
+        "them\n",
         name);
   }
   return selection.missing().empty() ? 0 : 1;
@@ -220,11 +221,13 @@ int inspect(const InspectArguments& arguments) {
 void addInspect(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("inspect",
                                       "Shows windows, hints, links, rings and pools in shared "
-                                      "memory, decoded and raw, and who waits for whom");
+                                      "memory, decoded and raw, and which process waits for "
+                                      "which");
   auto arguments = std::make_shared<InspectArguments>();
   auto* names = command.add_option("name", arguments->names,
-                                   "Servers, clients, routers, links (incarnation or its first 6 "
-                                   "digits) or files of these; default: a summary");
+                                   "Servers, clients, routers, links (hexadecimal number, or at "
+                                   "least its first 6 digits) or files of these; default: a "
+                                   "summary");
   command
       .add_option("--file", arguments->files,
                   "Segment files in any folder, for example copies made after a failure; files "

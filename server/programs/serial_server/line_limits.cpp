@@ -20,10 +20,11 @@ void LineLimits::addTo(CLI::App& app) {
           "How long the line must be silent before a write-read is sent; must be longer than the "
           "pause before an answer that the instrument repeats",
           kPause);
-  addTime(app, "--quiet-time", quietTime,
-          "The same after an answer that was late, damaged or too long; must be longer than the "
-          "pauses within an answer",
-          kPause);
+  addTime(
+      app, "--quiet-time", quietTime,
+      "How long the line must be silent after an answer that was late, damaged or too long; must "
+      "be longer than the pauses within an answer",
+      kPause);
   addTime(app, "--resync-limit", resyncLimit,
           "How long a late answer is awaited after its timeout; nothing is sent until it has "
           "arrived or this time has passed",

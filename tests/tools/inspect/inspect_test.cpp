@@ -173,9 +173,10 @@ TEST_F(InspectTest, NamesWhatWasNotFound) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.out, HasSubstr("server window"));
-  EXPECT_EQ(ended.err,
-            "mpf inspect: no server, client, link or router \"adc\"; `mpf inspect` lists all of "
-            "them\n");
+  EXPECT_EQ(
+      ended.err,
+      "mpf inspect: no server, client, link or router \"adc\"; `mpf inspect --json` lists all of "
+      "them\n");
 }
 
 TEST_F(InspectTest, ReadsALargeBodyFromItsChunkAndReportsAMissingPool) {
