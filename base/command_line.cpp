@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <limits>
 #include <string_view>
 #include <system_error>
@@ -24,13 +25,30 @@ std::string subcommandsOf(const CLI::App& app) {
 }
 
 // The program and the chosen subcommands: "mpf call" for `mpf call echo`.
-std::string chosenCommand(const CLI::App& app) {
-  std::string name = app.get_name();
-  for (const auto* command = &app; !command->get_subcommands().empty();) {
-    command = command->get_subcommands().front();
-    name += " " + command->get_name();
+struct Chosen {
+  const CLI::App* app;
+  std::string name;
+};
+Chosen chosenCommand(const CLI::App& app) {
+  Chosen chosen{&app, app.get_name()};
+  while (!chosen.app->get_subcommands().empty()) {
+    chosen.app = chosen.app->get_subcommands().front();
+    chosen.name += " " + chosen.app->get_name();
   }
-  return name;
+  return chosen;
+}
+
+// CLI11 lists unexpected arguments from the last to the first.
+std::string textOf(const CLI::App& command, const CLI::ParseError& error) {
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr) return error.what();
+  const auto words = command.remaining();
+  auto text = fmt::format("The following argument{} not expected: {}",
+                          words.size() == 1 ? " was" : "s were", fmt::join(words, " "));
+  const auto isPositional = [](const CLI::Option* option) { return option->get_positional(); };
+  if (!words.front().starts_with('-') && command.get_options(isPositional).empty() &&
+      command.get_option_no_throw("--backplane") != nullptr)
+    text += fmt::format("; a backplane is named with --backplane {}", words.front());
+  return text;
 }
 
 // Adds the exit statuses to the --help text of `app` and its subcommands, which have those of `app`
@@ -46,10 +64,10 @@ void addExitStatus(CLI::App& app, std::string status) {
 
 int explain(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-  const auto command = chosenCommand(app);
+  const auto [chosen, command] = chosenCommand(app);
   const auto subcommands = subcommandsOf(app);
-  if (command != app.get_name() || subcommands.empty())
-    return refuseArguments(command, error.what());
+  if (chosen != &app || subcommands.empty())
+    return refuseArguments(command, textOf(*chosen, error));
   if (const auto words = app.remaining(); !words.empty()) {
     printError(
         "{}: unknown subcommand or option \"{}\"; the subcommands are {}; `{} --help` shows what "

@@ -114,7 +114,7 @@ TEST_F(CommandLine, ReportsInvalidArgumentsOnStderrWithStatus2) {
       {{"--speed", "nan"}, "--speed: nan is out of range: use 0 to 1.5"},
       {{"--speed", "-0.1"}, "--speed: -0.1 is out of range: use 0 to 1.5"},
       {{"--speed", "fast"}, "--speed: fast is not a number: use 0 to 1.5"},
-      {{"--cuont", "1"}, "The following arguments were not expected: 1 --cuont"},
+      {{"--cuont", "1"}, "The following arguments were not expected: --cuont 1"},
   };
   for (const auto& [words, why] : wrong) {
     const auto outcome = parse(words);

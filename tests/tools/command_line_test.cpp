@@ -83,6 +83,9 @@ TEST_F(CommandLineTest, RefusesWrongArguments) {
        "mpf ls: The following argument was not expected: --jason; `mpf ls --help`"},
       {{"ls", "--interval", "0"},
        "mpf ls: --interval: 0 is out of range: use 1ms to 60min; `mpf ls"},
+      {{"ls", "lab"},
+       "mpf ls: The following argument was not expected: lab; a backplane is named with "
+       "--backplane lab; `mpf ls --help`"},
       {{"msr", "a", "b"}, "mpf msr: The following argument was not expected: b; `mpf msr --help`"},
       {{"call"}, "mpf call: server is required; `mpf call --help`"},
       {{"call", "echo"}, "mpf call: type is required; `mpf call --help`"},

@@ -115,13 +115,11 @@ class Caller {
   }
 
   [[nodiscard]] std::string whyNot(const Answer& answer) const {
-    auto why = answer.why();
+    const auto why = answer.why();
     if (answer.refusal() != SendResult::notConnected) return why;
-    const auto router =
-        whyUnreachable(Snapshot::take(Backplane::named(arguments_.backplane).name()),
-                       arguments_.server, arguments_.location);
-    if (!router.empty()) why += ": " + router;
-    return why + "; `mpf ls` shows all servers";
+    const auto snapshot = Snapshot::take(Backplane::named(arguments_.backplane).name());
+    return why + moreOfUnconnected(snapshot, arguments_.server, arguments_.location) +
+           "; `mpf ls` shows all servers";
   }
 
   void show(const Message& message) {
@@ -231,8 +229,8 @@ void addCall(CLI::App& app, Run& run) {
   command.footer(
       "Fields that are not named are 0. The message about an unknown field lists all fields.\n"
       "Example: mpf call Int32 int32 value=3\n"
-      "Example: mpf call voltmeter char8Array cmd=3 timeout=1 value='*IDN?\\n'    (a serial "
-      "server: write, then read; 1 s at most)\n"
+      "Example: mpf call voltmeter char8Array cmd=3 timeout=1 value='*IDN?\\n' --timeout 5    (a "
+      "serial server: write, then read; the instrument has 1 s)\n"
       "Exit status: 0 every message got a reply (even one that reports an error); 1 a message got "
       "no reply; 2 usage error, unknown type or field.");
   command.callback([arguments, &run] { run = [arguments] { return call(*arguments); }; });

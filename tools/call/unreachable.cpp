@@ -5,14 +5,22 @@
 #include <fmt/format.h>
 
 #include "base/printable.h"
+#include "base/process_stat.h"
 
 namespace mpf::tools {
 namespace {
 
-bool isReachable(const Snapshot& snapshot, std::string_view server, std::int32_t location) {
-  return std::ranges::any_of(snapshot.servers, [&](const WindowView& view) {
-    return view.name == server && view.location == location && view.life != Life::dead;
+// Returns null when there is no such server.
+template <class IsWanted>
+const WindowView* find(const Snapshot& snapshot, std::string_view server, IsWanted isWanted) {
+  const auto found = std::ranges::find_if(snapshot.servers, [&](const WindowView& view) {
+    return view.name == server && view.life != Life::dead && isWanted(view);
   });
+  return found == snapshot.servers.end() ? nullptr : &*found;
+}
+
+const WindowView* findAt(const Snapshot& snapshot, std::string_view server, std::int32_t location) {
+  return find(snapshot, server, [&](const auto& view) { return view.location == location; });
 }
 
 bool isOfThisHost(const Snapshot& snapshot, std::int32_t location) {
@@ -37,7 +45,7 @@ std::string reasonOf(const RouterView& router, const RouterLineView& line) {
 
 std::string whyUnreachable(const Snapshot& snapshot, std::string_view server,
                            std::int32_t location) {
-  if (isReachable(snapshot, server, location) || isOfThisHost(snapshot, location)) return {};
+  if (findAt(snapshot, server, location) != nullptr || isOfThisHost(snapshot, location)) return {};
   std::string text = fmt::format("no router of this host has a remote with location {}", location);
   for (const auto& router : snapshot.routers) {
     for (const auto& line : router.lines) {
@@ -48,6 +56,17 @@ std::string whyUnreachable(const Snapshot& snapshot, std::string_view server,
     }
   }
   return text;
+}
+
+std::string moreOfUnconnected(const Snapshot& snapshot, std::string_view server,
+                              std::int32_t location) {
+  if (const auto* const view = findAt(snapshot, server, location))
+    return isStopped(view->processState) ? fmt::format(" (its process {} is stopped)", view->pid)
+                                         : "";
+  if (const auto why = whyUnreachable(snapshot, server, location); !why.empty()) return ": " + why;
+  if (const auto* const other = find(snapshot, server, [](const auto&) { return true; }))
+    return fmt::format("; it runs at location {0}: --location {0}", other->location);
+  return {};
 }
 
 }  // namespace mpf::tools

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // whyUnreachable(): why clients cannot reach a server on another host, as far as the routers of the
-// backplane tell.
+// backplane tell. moreOfUnconnected(): what is known about a server without a connection.
 //
 // Threads  any.
 #pragma once
@@ -16,5 +16,10 @@ namespace mpf::tools {
 // Empty: the server has a window on this host, or `location` is that of servers of this host.
 [[nodiscard]] std::string whyUnreachable(const Snapshot& snapshot, std::string_view server,
                                          std::int32_t location);
+
+// What the tools append to the client's text when it is not connected, with its punctuation: that
+// the server's process is stopped, whyUnreachable(), or the location at which the server runs.
+[[nodiscard]] std::string moreOfUnconnected(const Snapshot& snapshot, std::string_view server,
+                                            std::int32_t location);
 
 }  // namespace mpf::tools

@@ -246,7 +246,9 @@ TEST_F(CallTest, FindsAServerAtAnotherLocation) {
   const EchoThread echo(backplane_, "echo", {.location = 5});
 
   EXPECT_EQ(call({"echo", "int32", "--location", "5"}).status, 0);
-  EXPECT_THAT(run({"call", "echo", "int32", "--timeout", "0.05"}).err, HasSubstr("at location 0"));
+  EXPECT_THAT(
+      run({"call", "echo", "int32", "--timeout", "0.05"}).err,
+      HasSubstr("at location 0 is not running; it runs at location 5: --location 5; `mpf "));
 }
 
 TEST_F(CallTest, ATypeWithoutAHandlerIsRefused) {

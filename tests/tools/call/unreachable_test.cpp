@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Why a server cannot be reached, from the rows of a router.
+// Why a client is not connected, from a snapshot.
 #include "tools/call/unreachable.h"
 
 #include <mpf/message_server.h>
@@ -62,6 +62,29 @@ TEST_F(WhyUnreachableTest, AServerWithAWindowIsReachable) {
 
   snapshot.servers.back().life = Life::dead;
   EXPECT_NE(whyUnreachable(snapshot, "echo", 2), "");
+}
+
+TEST_F(WhyUnreachableTest, AppendsWhatElseIsKnown) {
+  auto snapshot = Snapshot::take(name());
+  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 0), "");
+  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 7),
+            ": no router of this host has a remote with location 7");
+  WindowView window;
+  window.name = "echo";
+  window.location = 2;
+  window.pid = 77;
+  window.processState = 'S';
+  snapshot.servers.push_back(window);
+
+  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 2), "");
+  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 0), "; it runs at location 2: --location 2");
+  EXPECT_EQ(moreOfUnconnected(snapshot, "other", 0), "");
+
+  snapshot.servers.back().processState = 'T';
+  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 2), " (its process 77 is stopped)");
+
+  snapshot.servers.back().life = Life::dead;
+  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 0), "");
 }
 
 }  // namespace
