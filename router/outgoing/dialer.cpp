@@ -54,7 +54,9 @@ kj::Exception Dialer::stepFailed(const std::string& step, const kj::Exception& e
 kj::Promise<kj::Own<kj::AsyncIoStream>> Dialer::connectToOne(Addresses addresses) {
   const auto next = addresses.front();
   addresses.erase(addresses.begin());
-  return withTimeout(fmt::format("the connection to {}", next), connectTo(next))
+  const auto step = next == remote_.address.text() ? std::string("the connection")
+                                                   : fmt::format("the connection to {}", next);
+  return withTimeout(step, connectTo(next))
       .catch_([this, addresses = std::move(addresses)](
                   kj::Exception&& error) mutable -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
         if (addresses.empty()) return kj::mv(error);
@@ -69,16 +71,15 @@ kj::Promise<kj::Own<kj::AsyncIoStream>> Dialer::connectTo(const std::string& add
         .then([this](kj::AuthenticatedStream peer) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
           setSocketOptions(*peer.stream, context_.config.limits);
           if (remote_.security == Security::plain) return kj::mv(peer.stream);
-          return context_.tls
-              ->connect(kj::mv(peer),
-                        remote_.tlsName.empty() ? remote_.address.host : remote_.tlsName)
+          const auto& name = remote_.tlsName.empty() ? remote_.address.host : remote_.tlsName;
+          return context_.tls->connect(kj::mv(peer), name)
               .then(
                   [](kj::AuthenticatedStream secured) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
                     return kj::mv(secured.stream);
                   },
-                  [](kj::Exception&& error) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+                  [&name](kj::Exception&& error) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
                     return kj::Exception(kj::Exception::Type::FAILED, __FILE__, __LINE__,
-                                         kj::heapString(tlsProblem(error)));
+                                         kj::heapString(tlsProblem(error, name)));
                   });
         });
   });

@@ -43,6 +43,7 @@ constexpr const char* kNoTls =
     R"(the peer does not use TLS: set the same security, "tls" or "plain", at both routers)";
 constexpr const char* kNotVersion13 =
     "the peer does not support TLS 1.3, the only version that routers use";
+constexpr std::string_view kOtherName = "the peer's certificate is for another name";
 constexpr const char* kClosed = "the peer closed the connection during the TLS handshake";
 
 struct Problem {
@@ -55,7 +56,7 @@ constexpr std::array kProblems{
             "the peer's certificate was not signed by one of our authorities, or is not valid now"},
     Problem{"reason = certificate has expired", "the peer's certificate has expired"},
     Problem{"reason = certificate is not yet valid", "the peer's certificate is not valid yet"},
-    Problem{"reason = hostname mismatch", "the peer's certificate is for another name"},
+    Problem{"reason = hostname mismatch", kOtherName},
     Problem{"reason = unable to get local issuer",
             "the peer's certificate was not signed by one of our authorities"},
     Problem{"reason = self-signed certificate",
@@ -121,11 +122,14 @@ std::string peerName(kj::PeerIdentity& peer) {
   return name;
 }
 
-std::string tlsProblem(const kj::Exception& error) {
+std::string tlsProblem(const kj::Exception& error, const std::string& expectedName) {
   const std::string said = error.getDescription().cStr();
   const auto* const problem = std::ranges::find_if(
       kProblems, [&](const Problem& one) { return said.find(one.reported) != std::string::npos; });
-  return problem != kProblems.end() ? std::string(problem->meaning) : reasonOf(error);
+  if (problem == kProblems.end()) return reasonOf(error);
+  if (problem->meaning == kOtherName)
+    return fmt::format("{}, not for \"{}\" (tls-name)", kOtherName, displayText(expectedName));
+  return std::string(problem->meaning);
 }
 
 }  // namespace mpf::router

@@ -48,6 +48,8 @@ class Tls {
 [[nodiscard]] std::string peerName(kj::PeerIdentity& peer);
 
 // Says in plain words why a handshake, or the first read after it, has failed.
-[[nodiscard]] std::string tlsProblem(const kj::Exception& error);
+//   expectedName  `name` of connect(), if it failed
+[[nodiscard]] std::string tlsProblem(const kj::Exception& error,
+                                     const std::string& expectedName = {});
 
 }  // namespace mpf::router

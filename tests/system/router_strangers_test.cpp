@@ -177,7 +177,7 @@ TEST_F(RouterSlowNameTest, ALookUpForARemoteThatWasRemovedIsAbandonedSilently) {
   const auto router = startRouter();
   writeFile("127.0.0.1:9");
   router->signal(SIGHUP);
-  router->waitUntilSaid("cannot reach 127.0.0.1:9: ");
+  router->waitUntilSaid("cannot reach 127.0.0.1:9: the connection failed: ");
 
   const auto lookUp = endLookUp();
 

@@ -50,16 +50,17 @@ class TlsTest : public testing::Test {
     auto pipe = io_.provider->newTwoWayPipe();
     Sides sides;
     auto accepted = watch(server.accept(anonymous(kj::mv(pipe.ends[0]))), sides.server);
-    auto connected = watch(client.connect(anonymous(kj::mv(pipe.ends[1])), name), sides.client);
+    auto connected =
+        watch(client.connect(anonymous(kj::mv(pipe.ends[1])), name), sides.client, name);
     accepted.wait(io_.waitScope);
     connected.wait(io_.waitScope);
     return sides;
   }
   // Closes the connection when its handshake fails, as a router does.
-  kj::Promise<void> watch(Handshake handshake, Side& side) {
+  kj::Promise<void> watch(Handshake handshake, Side& side, const std::string& name = {}) {
     return handshake
         .then([&](kj::AuthenticatedStream stream) { side.connected = kj::mv(stream); },
-              [&](kj::Exception&& error) { side.problem = tlsProblem(error); })
+              [&side, name](kj::Exception&& error) { side.problem = tlsProblem(error, name); })
         .eagerlyEvaluate(nullptr);
   }
   static kj::AuthenticatedStream& streamOf(Side& side) {
@@ -185,7 +186,8 @@ TEST_F(TlsTest, RefusesCertificatesThatAreNotValidNow) {
 TEST_F(TlsTest, RefusesAServerOfAnotherName) {
   auto sides = shakeHands(*tls(ours_.files("server")), *tls(ours_.files("client")), "other");
 
-  EXPECT_EQ(sides.client.problem, "the peer's certificate is for another name");
+  EXPECT_EQ(sides.client.problem,
+            "the peer's certificate is for another name, not for \"other\" (tls-name)");
 }
 
 TEST_F(TlsTest, RefusesAClientWithoutCertificate) {
