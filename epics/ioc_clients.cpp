@@ -130,10 +130,10 @@ void IocClients::print(int level) const {
   const std::lock_guard lock(mutex_);
   for (const auto& [key, connection] : connections_) {
     const auto reason = connection->notConnectedBecause();
-    epicsStdoutPrintf("server \"%s\" at location %d: %u records, %s\n",
-                      connection->server().c_str(), connection->location(),
-                      static_cast<unsigned>(connection->members()),
-                      reason.empty() ? "connected" : reason.c_str());
+    const auto members = static_cast<unsigned>(connection->members());
+    epicsStdoutPrintf("server \"%s\" at location %d: %u record%s, %s\n",
+                      connection->server().c_str(), connection->location(), members,
+                      members == 1 ? "" : "s", reason.empty() ? "connected" : reason.c_str());
   }
   if (level < 1) return;
   for (const auto& [owner, device] : devices_) device->print();

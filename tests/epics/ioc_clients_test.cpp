@@ -2,10 +2,30 @@
 // IocClients: which callers share a connection, and how long a connection exists.
 #include "epics/ioc_clients.h"
 
+#include <cstdio>
+#include <cstdlib>
+#include <epicsStdio.h>
+#include <gmock/gmock.h>
+#include <memory>
+
 #include "tests/epics/epics_fixture.h"
 
 namespace mpf::test {
 namespace {
+
+using testing::HasSubstr;
+
+std::string reportOf(const IocClients& clients) {
+  char* text = nullptr;
+  std::size_t size = 0;
+  auto* const stream = ::open_memstream(&text, &size);
+  epicsSetThreadStdout(stream);
+  clients.print(0);
+  epicsSetThreadStdout(nullptr);
+  std::fclose(stream);
+  const std::unique_ptr<char, decltype(&std::free)> owner(text, &std::free);
+  return text;
+}
 
 using IocClientsTest = EpicsTest;
 
@@ -23,6 +43,18 @@ TEST_F(IocClientsTest, CallersWithTheSameArgumentsShareAConnection) {
   EXPECT_NE(clients.connectionTo("adc", 2, ""), shared);
   EXPECT_EQ(shared->server(), "adc");
   EXPECT_EQ(shared->location(), 1);
+}
+
+TEST_F(IocClientsTest, TheReportCountsTheRecordsOfAConnection) {
+  const std::string device = "field(DTYP, \"ip330Scan\") field(INP, ";
+  const Ioc ioc("record(ai, \"a\") {" + device + "\"#C0 S0 @adc\") }" +  //
+                "record(ai, \"b\") {" + device + "\"#C0 S0 @dac\") }" +  //
+                "record(ai, \"c\") {" + device + "\"#C0 S1 @dac\") }");
+
+  const auto report = reportOf(IocClients::instance());
+
+  EXPECT_THAT(report, HasSubstr("server \"adc\" at location 0: 1 record, server"));
+  EXPECT_THAT(report, HasSubstr("server \"dac\" at location 0: 2 records, server"));
 }
 
 // Connections exist as long as the IOC, even if no record uses them.

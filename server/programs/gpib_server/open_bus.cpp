@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/programs/gpib_server/open_bus.h"
 
+#include <fmt/format.h>
 #include <stdexcept>
 #include <utility>
 
@@ -23,7 +24,10 @@ std::unique_ptr<GpibBus> openBus(GpibStartOptions& options, const ServerLog& log
   for (std::string logged;;) {
     try {
       return std::make_unique<GpibBus>(openGpibController(options.module));
-    } catch (const std::runtime_error& error) {  // not invalid_argument: waiting does not mend it
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(
+          fmt::format("{}; or the MODULE of --ti9914 MODULE,CARRIER,SITE[,VECTOR]", error.what()));
+    } catch (const std::runtime_error& error) {
       if (!options.hardware.waits()) throw;
       if (std::exchange(logged, error.what()) != error.what())
         log->warn("waiting for the controller: {}", error.what());

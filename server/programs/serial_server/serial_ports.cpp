@@ -92,8 +92,17 @@ void SerialPorts::follow(OctalUart& uart, const std::string& module) const {
 // ---- ports
 
 std::shared_ptr<SerialPort> SerialPorts::openPort(const std::string& port) {
-  const bool waits = options_.hardware.waits();
   if (const auto* const start = options_.octal.find(port)) return openOctalPort(*start);
+  try {
+    return openLine(port);
+  } catch (const std::runtime_error& error) {
+    if (options_.hardware.waits()) throw;
+    throw std::runtime_error(fmt::format("{}; --wait waits for it", error.what()));
+  }
+}
+
+std::shared_ptr<SerialPort> SerialPorts::openLine(const std::string& port) {
+  const bool waits = options_.hardware.waits();
   if (const auto address = tcpAddressOf(port)) {
     TcpSerialOptions tcp;
     tcp.address = TcpAddress::parse(*address);

@@ -45,6 +45,7 @@ class SerialPorts {
   OctalUart& openUart(const OctalUartStart& start);
   void follow(OctalUart& uart, const std::string& module) const;
   [[nodiscard]] std::shared_ptr<SerialPort> openPort(const std::string& port);
+  [[nodiscard]] std::shared_ptr<SerialPort> openLine(const std::string& port);
   [[nodiscard]] std::shared_ptr<SerialPort> openOctalPort(const OctalPortStart& start);
   [[nodiscard]] std::shared_ptr<SerialPort> openLater(const OctalPortStart& port,
                                                       const OctalUartStart& uart);

@@ -45,7 +45,9 @@ TEST_F(OpenBusTest, AnUnknownControllerIsAnError) {
     static_cast<void>(openBus(options_, log_, stop_));
     ADD_FAILURE() << "it was opened";
   } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("nowhere"));
+    EXPECT_THAT(error.what(),
+                AllOf(HasSubstr("nowhere"),
+                      HasSubstr("linux-gpib:0; or the MODULE of --ti9914 MODULE,CARRIER,SITE")));
   }
 }
 

@@ -282,8 +282,8 @@ TEST_F(SerialProgramTest, ReportsThePortThatItCannotOpen) {
 
   EXPECT_TRUE(hasExitedWith(server->wait(), 1));
 
-  EXPECT_THAT(server->errors(),
-              HasSubstr("mpf-serial-server: open " + path_ + ": No such file or directory"));
+  EXPECT_THAT(server->errors(), HasSubstr("mpf-serial-server: open " + path_ +
+                                          ": No such file or directory; --wait waits for it"));
 }
 
 }  // namespace
