@@ -165,7 +165,8 @@ std::string hostName() {
 }  // namespace
 
 const char* toString(CauseKind kind) noexcept {
-  constexpr std::array<const char*, 5> kNames{"signal", "exit", "stalled", "restarted", "unknown"};
+  constexpr std::array<const char*, 6> kNames{"signal", "exit",      "stalled",
+                                              "busy",   "restarted", "unknown"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

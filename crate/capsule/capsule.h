@@ -28,7 +28,7 @@ namespace mpf::crate {
 
 inline constexpr int kCapsuleVersion = 1;
 
-enum class CauseKind { signal, exit, stalled, restarted, unknown };
+enum class CauseKind { signal, exit, stalled, busy, restarted, unknown };
 [[nodiscard]] const char* toString(CauseKind kind) noexcept;
 
 struct Cause {

@@ -43,6 +43,7 @@ std::string causeText(const Tree& cause) {
   if (kind == "signal") return "died by " + text(cause, "name");
   if (kind == "exit") return "ended with exit status " + text(cause, "status");
   if (kind == "stalled") return "stalled and was ended";
+  if (kind == "busy") return "was busy for too long and was ended";
   if (kind == "restarted") return "was restarted by request";
   return "ended for an unknown reason";
 }

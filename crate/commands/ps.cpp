@@ -34,6 +34,7 @@
 #include "crate/supervisor/log_follower.h"
 #include "tools/text/json_text.h"
 #include "tools/text/table.h"
+#include "tools/text/wrap.h"
 
 namespace mpf::crate {
 namespace {
@@ -54,12 +55,27 @@ void addUse(json& process) {
   process["memoryBytes"] = resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
+// What the supervisor calls ready may be stalled or busy.
 std::string stateOf(const json& process) {
-  return process.value("isStalled", false) ? "stalled" : process.at("state").get<std::string>();
+  const std::string state = process.at("state");
+  if (state != "ready") return state;
+  if (process.value("isStalled", false)) return "stalled";
+  return process.contains("handling") ? "busy" : state;
 }
 
 std::string printableOf(const json& object, const char* key) {
   return printable(object.at(key).get<std::string>());
+}
+
+// "  busy: uart, server a-Serial[0], with int32 cmd=3 for 35.2 s"
+std::string workOf(const json& process) {
+  const auto& work = process.at("handling");
+  return tools::wrap("  busy: ",
+                     fmt::format("{}, server {}, with {} cmd={} for {}",
+                                 printableOf(process, "name"), printableOf(work, "server"),
+                                 printableOf(work, "type"), work.at("cmd").get<std::int32_t>(),
+                                 durationText(work.at("forS").get<double>() * 1e9)),
+                     4);
 }
 
 void printCrate(const json& crate) {
@@ -72,14 +88,16 @@ void printCrate(const json& crate) {
     const auto pid = process.at("pid").get<int>();
     const auto isRunning = pid != 0;
     table.add(
-        {printableOf(process, "name"), stateOf(process), isRunning ? fmt::to_string(pid) : "-",
-         fmt::to_string(process.at("restarts").get<int>()),
+        {printableOf(process, "name"), printableOf(process, "state"),
+         isRunning ? fmt::to_string(pid) : "-", fmt::to_string(process.at("restarts").get<int>()),
          isRunning ? durationText(process.at("upS").get<double>() * 1e9) : "-",
          isRunning ? durationText(process.at("cpuS").get<double>() * 1e9) : "-",
          isRunning ? fmt::format("{:.1f} MB", process.at("memoryBytes").get<double>() / 1e6) : "-",
          printableOf(process, "reason")});
   }
   fmt::print("{}", table.fitted("  "));
+  for (const auto& process : crate.at("processes"))
+    if (process.at("state") == "busy") fmt::print("{}", workOf(process));
 }
 
 // The processes of a crate whose supervisor has ended; nothing: none runs.
@@ -111,7 +129,10 @@ std::optional<json> tryUnsupervised(const CrateFolder& folder) {
 std::optional<json> tryReport(const CrateFolder& folder) try {
   auto crate = tryUnsupervised(folder).value_or(json());
   if (crate.is_null()) crate = askSupervisor(folder, {{"do", "ps"}});
-  for (auto& process : crate.at("processes")) addUse(process);
+  for (auto& process : crate.at("processes")) {
+    addUse(process);
+    process["state"] = stateOf(process);
+  }
   return crate;
 } catch (const std::exception& error) {
   printError("mpf ps: {}\n", error.what());

@@ -37,6 +37,7 @@ struct Supervision {
   std::optional<std::chrono::milliseconds> startTime;  // from the start until its servers bind
   std::optional<std::chrono::milliseconds> stopTime;  // from SIGTERM to SIGKILL
   std::optional<std::chrono::milliseconds> stallLimit;  // 0: a stalled server is not restarted
+  std::optional<std::chrono::milliseconds> busyLimit;  // of one request; 0: none
   std::optional<std::chrono::milliseconds> firstPause;  // before a restart; each further is doubled
   std::optional<std::chrono::milliseconds> lastPause;  // the longest one
   std::optional<int> maxRestarts;  // within restartWindow; then the process has failed
@@ -48,6 +49,7 @@ inline constexpr Restart kRestart = Restart::always;
 inline constexpr std::chrono::milliseconds kStartTime{30'000};
 inline constexpr std::chrono::milliseconds kStopTime{5'000};
 inline constexpr std::chrono::milliseconds kStallLimit{10'000};
+inline constexpr std::chrono::milliseconds kBusyLimit{0};
 inline constexpr std::chrono::milliseconds kFirstPause{100};
 inline constexpr std::chrono::milliseconds kLastPause{10'000};
 inline constexpr int kMaxRestarts = 20;

@@ -51,6 +51,7 @@ Json supervisionKeys() {
           {"start-time", duration()},
           {"stop-time", duration()},
           {"stall-limit", durationOrOff()},
+          {"busy-limit", durationOrOff()},
           {"first-pause", duration()},
           {"last-pause", duration()},
           {"max-restarts", {{"type", "integer"}, {"minimum", 0}}},

@@ -120,6 +120,7 @@ ProcessPlan planOf(const Crate& crate, const Process& process, const std::string
   choose(plan.startTime, &Supervision::startTime);
   choose(plan.stopTime, &Supervision::stopTime);
   choose(plan.stallLimit, &Supervision::stallLimit);
+  choose(plan.busyLimit, &Supervision::busyLimit);
   choose(plan.firstPause, &Supervision::firstPause);
   choose(plan.lastPause, &Supervision::lastPause);
   choose(plan.maxRestarts, &Supervision::maxRestarts);

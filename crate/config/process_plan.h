@@ -28,6 +28,7 @@ struct ProcessPlan {
   std::chrono::milliseconds startTime = kStartTime;
   std::chrono::milliseconds stopTime = kStopTime;
   std::chrono::milliseconds stallLimit = kStallLimit;  // 0: none
+  std::chrono::milliseconds busyLimit = kBusyLimit;  // 0: none
   std::chrono::milliseconds firstPause = kFirstPause;
   std::chrono::milliseconds lastPause = kLastPause;
   int maxRestarts = kMaxRestarts;

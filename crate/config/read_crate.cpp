@@ -63,6 +63,7 @@ std::string placeOfKey(const std::string& key) {
                                                          {"start-time", kSupervision},
                                                          {"stop-time", kSupervision},
                                                          {"stall-limit", kSupervision},
+                                                         {"busy-limit", kSupervision},
                                                          {"first-pause", kSupervision},
                                                          {"last-pause", kSupervision},
                                                          {"max-restarts", kSupervision},
@@ -234,14 +235,15 @@ class CrateReader {
   }
 
   static void readSupervision(TomlTable& table, Supervision& to) {
-    const auto readTime = [&](const char* key, std::optional<milliseconds>& value) {
-      table.readWith(key, [&](const std::string& text) { value = parseDuration(text); });
+    const auto readTime = [&](const char* key, std::optional<milliseconds>& value,
+                              milliseconds (*parse)(const std::string&) = parseDuration) {
+      table.readWith(key, [&](const std::string& text) { value = parse(text); });
     };
     table.readWith("restart", [&](const std::string& text) { to.restart = parseRestart(text); });
     readTime("start-time", to.startTime);
     readTime("stop-time", to.stopTime);
-    table.readWith("stall-limit",
-                   [&](const std::string& text) { to.stallLimit = parseStallLimit(text); });
+    readTime("stall-limit", to.stallLimit, parseDurationOrOff);
+    readTime("busy-limit", to.busyLimit, parseDurationOrOff);
     readTime("first-pause", to.firstPause);
     readTime("last-pause", to.lastPause);
     table.readWith("max-restarts",
@@ -341,7 +343,7 @@ milliseconds parseDuration(const std::string& text) {
   throw std::invalid_argument(fmt::format(kDurationRule, text, ""));
 }
 
-milliseconds parseStallLimit(const std::string& text) {
+milliseconds parseDurationOrOff(const std::string& text) {
   if (text == "off") return milliseconds(0);
   if (const auto duration = tryDuration(text)) return *duration;
   throw std::invalid_argument(fmt::format(kDurationRule, text, ", or off"));

@@ -35,6 +35,6 @@ void checkCarrierNames(const Crate& crate, const std::map<std::string, std::stri
 //   throws  std::invalid_argument that shows the form
 [[nodiscard]] std::chrono::milliseconds parseDuration(const std::string& text);
 // The same, or "off" (0).
-[[nodiscard]] std::chrono::milliseconds parseStallLimit(const std::string& text);
+[[nodiscard]] std::chrono::milliseconds parseDurationOrOff(const std::string& text);
 
 }  // namespace mpf::crate

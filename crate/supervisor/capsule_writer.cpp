@@ -13,6 +13,7 @@ namespace {
 Cause causeOf(const Service& service, const ProcessEnd& end) {
   auto cause = end.waitStatus ? Cause::ofWaitStatus(*end.waitStatus) : Cause();
   if (service.endReason() == EndReason::stalled) cause.kind = CauseKind::stalled;
+  if (service.endReason() == EndReason::busy) cause.kind = CauseKind::busy;
   if (service.endReason() == EndReason::restartRequest) cause.kind = CauseKind::restarted;
   return cause;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// CapsuleWriter: writes a capsule when a process of the crate dies, is stalled, or is restarted.
+// CapsuleWriter: writes a capsule when a process of the crate dies, or is ended because it is
+// stalled, busy or restarted.
 //
 //   watch(), look() ─► SegmentWitness        the process dies ─► collect() ─► CapsuleStore
 //

@@ -31,6 +31,14 @@ bool takesNothing(const WindowView& was, const WindowView& is) {
 void ServerWatch::look() {
   before_ = std::move(now_);
   now_ = tools::Snapshot::take(backplane_);
+  std::map<std::uint64_t, Begin> begins;
+  for (const auto& window : now_->servers) {
+    if (!window.handling || window.life != Life::alive || isStopped(window.processState)) continue;
+    const auto was = begins_.find(window.incarnation);
+    const auto isSame = was != begins_.end() && was->second.received == window.received;
+    begins[window.incarnation] = isSame ? was->second : Begin{window.received, now_->atNs};
+  }
+  begins_ = std::move(begins);
 }
 
 std::vector<std::string> ServerWatch::notServing(pid_t pid, std::int32_t location,
@@ -53,6 +61,18 @@ bool ServerWatch::isStalled(pid_t pid) const {
     return window.pid == pid && window.life == Life::alive && was != before_->servers.end() &&
            takesNothing(*was, window);
   });
+}
+
+std::optional<Work> ServerWatch::workOf(pid_t pid) const {
+  std::optional<Work> longest;
+  if (!now_) return longest;
+  for (const auto& window : now_->servers) {
+    const auto begin = begins_.find(window.incarnation);
+    if (window.pid != pid || begin == begins_.end()) continue;
+    const auto forNs = now_->atNs - begin->second.atNs;
+    if (forNs > (longest ? longest->forNs : 0)) longest = {window.name, *window.handling, forNs};
+  }
+  return longest;
 }
 
 void ServerWatch::removeFilesOfDead() const {

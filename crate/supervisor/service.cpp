@@ -9,9 +9,12 @@
 #include "base/duration_text.h"
 #include "base/run_main.h"
 #include "base/signal_name.h"
+#include "tools/report/snapshot_delta.h"
 
 namespace mpf::crate {
 namespace {
+
+constexpr std::int64_t kBusyNs = 1'000'000'000;
 
 std::int64_t nanoseconds(std::chrono::nanoseconds time) { return time.count(); }
 
@@ -58,6 +61,7 @@ void Service::started(pid_t pid, std::uint64_t startTicks, std::int64_t nowNs) {
   endReason_ = EndReason::none;
   missing_.clear();
   stalledSinceNs_.reset();
+  work_.reset();
 }
 
 void Service::adopted(pid_t pid, std::uint64_t startTicks, int restarts, std::int64_t nowNs,
@@ -82,6 +86,7 @@ void Service::becameReady() {
 void Service::ended(const ProcessEnd& end, std::int64_t nowNs) {
   pid_ = 0;
   stalledSinceNs_.reset();
+  work_.reset();
   // The reason of a restart that the supervisor decided stays.
   if (state_ != ServiceState::stopping) reason_ = end.text();
   if (isStopRequested_) {
@@ -89,7 +94,7 @@ void Service::ended(const ProcessEnd& end, std::int64_t nowNs) {
   } else if (isRestartRequested_) {
     ++restarts_;
     state_ = ServiceState::waiting;
-  } else if (state_ == ServiceState::stopping) {  // stalled, or not ready in time
+  } else if (state_ == ServiceState::stopping) {  // stalled, busy, or not ready in time
     if (plan_.restart == Restart::never) state_ = ServiceState::failed;
     else plan(nowNs);
   } else if (!mayRestart(end)) {
@@ -127,9 +132,15 @@ std::chrono::nanoseconds Service::pause() const {
   return std::min(pause, plan_.lastPause);
 }
 
-void Service::looked(bool isStalled, std::int64_t nowNs) {
-  if (!isStalled || state_ != ServiceState::ready) return stalledSinceNs_.reset();
-  if (!stalledSinceNs_) stalledSinceNs_ = nowNs;
+void Service::looked(bool isStalled, std::optional<Work> work, std::int64_t nowNs) {
+  const auto isReady = state_ == ServiceState::ready;
+  if (!isStalled || !isReady) stalledSinceNs_.reset();
+  else if (!stalledSinceNs_) stalledSinceNs_ = nowNs;
+  const auto limit = nanoseconds(plan_.busyLimit);
+  if (work && isReady && limit != 0 && work->forNs >= limit)
+    kill(EndReason::busy, "busy with " + tools::workText(work->handling, work->forNs), nowNs);
+  work_.reset();
+  if (work && state_ == ServiceState::ready && work->forNs >= kBusyNs) work_ = std::move(work);
 }
 
 void Service::terminate(EndReason reason, const std::string& why, std::int64_t nowNs) {
@@ -140,6 +151,12 @@ void Service::terminate(EndReason reason, const std::string& why, std::int64_t n
   endReason_ = reason;
   isSignalled_ = false;
   killAtNs_ = nowNs + nanoseconds(plan_.stopTime);
+}
+
+// For a process with a server that takes no messages: it does not handle SIGTERM, either.
+void Service::kill(EndReason reason, const std::string& why, std::int64_t nowNs) {
+  terminate(reason, why, nowNs);
+  killAtNs_ = nowNs;
 }
 
 void Service::requestStart() {
@@ -186,11 +203,10 @@ Action Service::action(bool areNeedsReady, std::int64_t nowNs) {
     case ServiceState::ready:
       if (stalledSinceNs_ && plan_.stallLimit.count() != 0 &&
           nowNs >= *stalledSinceNs_ + nanoseconds(plan_.stallLimit)) {
-        terminate(EndReason::stalled,
-                  fmt::format("stalled for {}",
-                              durationText(static_cast<double>(nowNs - *stalledSinceNs_))),
-                  nowNs);
-        killAtNs_ = nowNs;  // a server that takes no messages does not handle SIGTERM, either
+        kill(EndReason::stalled,
+             fmt::format("stalled for {}",
+                         durationText(static_cast<double>(nowNs - *stalledSinceNs_))),
+             nowNs);
       }
       break;
     default:

@@ -4,7 +4,7 @@
 //
 //                 needs are ready         servers are bindable
 //     waiting ──────────────────► starting ────────────────► ready
-//        ▲                          │ ended, or too slow       │ ended, stalled
+//        ▲                          │ ended, or too slow       │ ended, stalled, busy
 //        │ pause is over            ▼                          │
 //     pausing ◄────────────────── (ended) ◄────────────────────┘
 //                                   │ too many restarts, or wrong arguments: failed
@@ -22,6 +22,7 @@
 #include <string>
 
 #include "crate/config/process_plan.h"
+#include "shm/handling.h"
 
 namespace mpf::crate {
 
@@ -32,7 +33,7 @@ enum class ServiceState { waiting, starting, ready, stopping, pausing, failed, s
 enum class Action { none, start, terminate, kill };
 
 // Why the supervisor ends a process.
-enum class EndReason { none, stopRequest, restartRequest, stalled, notReady };
+enum class EndReason { none, stopRequest, restartRequest, stalled, busy, notReady };
 
 // How a process ended.
 struct ProcessEnd {
@@ -40,6 +41,13 @@ struct ProcessEnd {
   [[nodiscard]] std::string text() const;  // "exit status 1", "SIGSEGV"
   [[nodiscard]] bool isBySignal() const noexcept;
   [[nodiscard]] bool hasExited(int status) const noexcept;
+};
+
+// The request that a server of a process works on.
+struct Work {
+  std::string server;
+  Handling handling;
+  std::int64_t forNs = 0;  // at least; until it was looked at last
 };
 
 class Service {
@@ -56,8 +64,9 @@ class Service {
   void lacks(std::string missing) { missing_ = std::move(missing); }
   void becameReady();
   void ended(const ProcessEnd& end, std::int64_t nowNs);
-  // `isStalled`: messages wait for a server of the process, and it takes none.
-  void looked(bool isStalled, std::int64_t nowNs);
+  //   isStalled  messages wait for a server of the process, and it takes none
+  //   work       the request on which a server of the process has worked longest
+  void looked(bool isStalled, std::optional<Work> work, std::int64_t nowNs);
 
   // ---- what is requested
   void requestStart();
@@ -85,6 +94,8 @@ class Service {
   [[nodiscard]] int restarts() const noexcept { return restarts_; }
   [[nodiscard]] std::int64_t startedNs() const noexcept { return startedNs_; }
   [[nodiscard]] bool isStalled() const noexcept { return stalledSinceNs_.has_value(); }
+  // The request on which a server works for a long time; nullopt: on none.
+  [[nodiscard]] const std::optional<Work>& work() const noexcept { return work_; }
   [[nodiscard]] const std::string& missing() const noexcept { return missing_; }
   // Why the supervisor ends the process that runs; none: it does not.
   [[nodiscard]] EndReason endReason() const noexcept { return endReason_; }
@@ -93,6 +104,7 @@ class Service {
 
  private:
   void terminate(EndReason reason, const std::string& why, std::int64_t nowNs);
+  void kill(EndReason reason, const std::string& why, std::int64_t nowNs);
   void plan(std::int64_t nowNs);  // of the next start, after an end
   [[nodiscard]] bool mayRestart(const ProcessEnd& end) const;
   [[nodiscard]] std::chrono::nanoseconds pause() const;
@@ -112,6 +124,7 @@ class Service {
   std::int64_t killAtNs_ = 0;  // while stopping
   bool isSignalled_ = false;  // while stopping: SIGTERM was sent
   std::optional<std::int64_t> stalledSinceNs_;
+  std::optional<Work> work_;  // for at least kBusyNs
   EndReason endReason_ = EndReason::none;
   std::string reason_;
 };

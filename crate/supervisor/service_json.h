@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <mpf/clock.h>
+#include <mpf/message_layout.h>
 
 #include "crate/supervisor/service.h"
 
@@ -12,12 +13,20 @@ namespace mpf::crate {
 
 [[nodiscard]] inline nlohmann::json toJson(const Service& service) {
   const auto upNs = service.isRunning() ? Clock::nowNs() - service.startedNs() : 0;
-  return {{"name", service.plan().name},        {"state", toString(service.state())},
-          {"isStalled", service.isStalled()},   {"pid", service.pid()},
-          {"restarts", service.restarts()},     {"upS", static_cast<double>(upNs) / 1e9},
-          {"reason", service.reason()},         {"needs", service.plan().needs},
-          {"servers", service.plan().servers},  {"command", service.plan().command},
-          {"notifies", service.plan().notifies}};
+  nlohmann::json json{
+      {"name", service.plan().name},        {"state", toString(service.state())},
+      {"isStalled", service.isStalled()},   {"pid", service.pid()},
+      {"restarts", service.restarts()},     {"upS", static_cast<double>(upNs) / 1e9},
+      {"reason", service.reason()},         {"needs", service.plan().needs},
+      {"servers", service.plan().servers},  {"command", service.plan().command},
+      {"notifies", service.plan().notifies}};
+  if (const auto& work = service.work()) {
+    json["handling"] = {{"server", work->server},
+                        {"type", toString(static_cast<MessageType>(work->handling.type))},
+                        {"cmd", work->handling.cmd},
+                        {"forS", static_cast<double>(work->forNs) / 1e9}};
+  }
+  return json;
 }
 
 }  // namespace mpf::crate

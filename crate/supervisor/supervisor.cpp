@@ -26,10 +26,6 @@ using std::chrono::milliseconds;
 
 constexpr Nanoseconds kLookWhileStarting = milliseconds(20), kLook = milliseconds(1000);
 
-void log(const Service& service, const std::string& text) {
-  printError("mpf run: {}: {}\n", service.plan().name, text);
-}
-
 void print(const std::vector<LogLimiter::Line>& lines) {
   for (const auto& line : lines) printError("mpf run: {}\n", line.text);
 }
@@ -37,11 +33,6 @@ void print(const std::vector<LogLimiter::Line>& lines) {
 FileDescriptor createLocked(const CrateFolder& folder) {
   folder.create();
   return folder.lock();
-}
-
-bool hasChanged(const RecordedProcess& process, const ProcessPlan& plan) {
-  return process.command != shellText(plan) ||
-         (!process.context.empty() && process.context != contextText(plan));
 }
 
 }  // namespace
@@ -60,6 +51,10 @@ Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
   takeOver();
 }
 
+void Supervisor::log(const Service& service, const std::string& text) {
+  printError("mpf run: {}: {}\n", service.plan().name, text);
+}
+
 void Supervisor::run() {
   const auto isRunning = [](const auto& member) { return member->service.isRunning(); };
   while (!isShuttingDown_ || std::ranges::any_of(members_, isRunning)) {
@@ -73,37 +68,6 @@ void Supervisor::run() {
   } while (logs_.hasMore() && errors_.isEmpty());
   print(problems_.takeAll(Clock::nowNs()));
   ::unlink(folder_.file("control").c_str());
-}
-
-// Each process that an earlier supervisor has started and that still runs is supervised again. One
-// that the crate has no more, or with another command line or changed files, is ended.
-void Supervisor::takeOver() {
-  for (const auto& recorded : CrateState::read(folder_.file("state.json")).processes) {
-    auto* member = find(recorded.name);
-    auto pidfd = openPidfd(recorded.pid);
-    const auto startTicks = startTicksOf(recorded.pid);
-    if (startTicks == 0 || startTicks != recorded.startTicks) {  // it has ended
-      if (member != nullptr && recorded.isStopRequested)
-        member->service.requestStop(Clock::nowNs());
-      continue;
-    }
-    if (member == nullptr) {
-      ProcessPlan plan;
-      plan.name = recorded.name;
-      member = members_.emplace_back(std::make_unique<Member>(plan)).get();
-      member->isRemoved = true;
-    }
-    auto& service = member->service;
-    member->isAdopted = true;
-    member->adopted = std::move(pidfd);
-    member->isNotified = true;
-    service.adopted(recorded.pid, recorded.startTicks, recorded.restarts, Clock::nowNs(),
-                    startNsOf(recorded.startTicks));
-    capsuleWriter_.watch(service);
-    log(service, fmt::format("taken over, pid {}", recorded.pid));
-    if (member->isRemoved || recorded.isStopRequested) service.requestStop(Clock::nowNs());
-    else if (hasChanged(recorded, service.plan())) service.requestRestart(Clock::nowNs());
-  }
 }
 
 void Supervisor::beginShutdown() {
@@ -263,7 +227,7 @@ void Supervisor::lookForEnds() {
   }
 }
 
-// Finds out which processes are ready, and which are stalled.
+// Finds out which processes are ready, and which are stalled or busy.
 void Supervisor::look() {
   attempt([&] { lookForEnds(); });
   attempt([&] {
@@ -278,7 +242,8 @@ void Supervisor::look() {
     auto& service = member->service;
     const auto watch = watches_.find(service.plan().backplane);
     if (!service.isRunning() || watch == watches_.end()) continue;
-    service.looked(watch->second.isStalled(service.pid()), now);
+    service.looked(watch->second.isStalled(service.pid()), watch->second.workOf(service.pid()),
+                   now);
     if (service.state() != ServiceState::starting) continue;
     service.lacks(whatIsMissing(*member));
     if (!service.missing().empty()) continue;
@@ -311,26 +276,9 @@ void Supervisor::takeReports() {
   nextLookNs_ = 0;
 }
 
-void Supervisor::record() const {
-  CrateState state;
-  state.file = crate_.file;
-  for (const auto& member : members_) {
-    const auto& service = member->service;
-    state.processes.push_back({service.plan().name, service.pid(), service.startTicks(),
-                               service.restarts(), shellText(service.plan()),
-                               service.isStopRequested() && !isShuttingDown_ && !member->isRemoved,
-                               contextText(service.plan())});
-  }
-  state.write(folder_.file("state.json"));
-}
-
 void Supervisor::noteProblem(std::string_view what) {
   if (problems_.admit({__FILE__, __LINE__}, 0, what, Clock::nowNs()))
     printError("mpf run: {}\n", what);
-}
-
-void Supervisor::tryRecord() {
-  isRecorded_ = attempt([&] { record(); });
 }
 
 int Supervisor::waitMs() const {

@@ -56,6 +56,7 @@ class Supervisor {
     bool isRemoved = false;  // no longer in the crate: forgotten when it has ended
   };
 
+  static void log(const Service& service, const std::string& text);
   void takeOver();
   std::vector<std::string> apply(const std::vector<ProcessPlan>& plans);
   std::vector<std::string> reload();

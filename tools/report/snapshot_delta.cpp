@@ -148,11 +148,7 @@ bool SnapshotDelta::isBusy(const WindowView& window) const {
 
 std::string SnapshotDelta::workOf(const WindowView& window) const {
   if (!isBusy(window)) return {};
-  const auto& handling = *window.handling;
-  return fmt::format(
-      "{} cmd={} for {}", toString(static_cast<MessageType>(handling.type)), handling.cmd,
-      durationText(
-          static_cast<double>(std::max<std::int64_t>(now_.atNs - window.progressAtNs, 0))));
+  return workText(*window.handling, std::max<std::int64_t>(now_.atNs - window.progressAtNs, 0));
 }
 
 std::string SnapshotDelta::stateOf(const WindowView& window) const {
@@ -179,6 +175,11 @@ SnapshotDelta::RouterLineOf SnapshotDelta::routerOf(const WindowView& window) co
   if (router == now_.routers.end()) return {};
   const auto line = std::ranges::find(router->lines, window.routerRow, &RouterLineView::row);
   return line == router->lines.end() ? RouterLineOf() : RouterLineOf{&*router, &*line};
+}
+
+std::string workText(const Handling& handling, std::int64_t forNs) {
+  return fmt::format("{} cmd={} for {}", toString(static_cast<MessageType>(handling.type)),
+                     handling.cmd, durationText(static_cast<double>(forNs)));
 }
 
 Latencies between(const Latencies& was, const Latencies& is) noexcept {

@@ -77,6 +77,9 @@ class SnapshotDelta {
   std::unordered_map<std::uint64_t, const LinkView*> linksBefore_;  // by incarnation
 };
 
+// "char8Array cmd=3 for 35.2 s".
+[[nodiscard]] std::string workText(const Handling& handling, std::int64_t forNs);
+
 // The samples that a histogram gained between two snapshots. The maximum is that of `is`, because
 // the maximum of the new samples alone is not known.
 [[nodiscard]] Latencies between(const Latencies& was, const Latencies& is) noexcept;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // crashing_server BACKPLANE: a server "victim" that replies to each Int32 with the same value, and
-// dies by SIGSEGV in the middle of a request whose cmd is 9, and at a bad address when it is 10.
+// dies by SIGSEGV in the middle of a request whose cmd is 9, and at a bad address when it is 10. It
+// works on a request whose cmd is 11 for ever.
 // Prints "open" when clients can bind. The limit of cores is 0 unless MPF_TEST_CORES is set.
 #include <signal.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -24,6 +26,7 @@ int main(int argc, char** argv) {
   server.on<mpf::Int32>([](mpf::Int32& request) {
     if (request.cmd == 9) ::raise(SIGSEGV);
     if (request.cmd == 10) writeTo(request.address);
+    while (request.cmd == 11) ::pause();
   });
   std::puts("open");
   std::fflush(stdout);

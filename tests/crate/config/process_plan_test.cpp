@@ -82,9 +82,10 @@ TEST_F(ProcessPlanTest, TheEnvironmentNamesTheBackplane) {
 TEST_F(ProcessPlanTest, LimitsAreThoseOfTheProcessOrOfTheCrate) {
   const auto plans = plan(
       "[supervision]\nstall-limit = \"3s\"\nmax-restarts = 5\n[[server]]\nprogram = \"int32\"\n"
-      "stall-limit = \"off\"\n");
+      "stall-limit = \"off\"\nbusy-limit = \"7s\"\n");
 
   EXPECT_EQ(plans[0].stallLimit, 0ms);
+  EXPECT_EQ(plans[0].busyLimit, 7s);
   EXPECT_EQ(plans[0].maxRestarts, 5);
   EXPECT_EQ(plans[0].startTime, kStartTime);
 }

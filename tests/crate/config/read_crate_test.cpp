@@ -44,6 +44,7 @@ restart = "on-failure"
 start-time = "5s"
 stop-time = "1s"
 stall-limit = "off"
+busy-limit = "1min"
 first-pause = "10ms"
 last-pause = "1min"
 max-restarts = 3
@@ -101,6 +102,7 @@ command = ["viewer", "--all"]
   EXPECT_EQ(crate.supervision.startTime, 5s);
   EXPECT_EQ(crate.supervision.stopTime, 1s);
   EXPECT_EQ(crate.supervision.stallLimit, 0ms);
+  EXPECT_EQ(crate.supervision.busyLimit, 1min);
   EXPECT_EQ(crate.supervision.firstPause, 10ms);
   EXPECT_EQ(crate.supervision.lastPause, 1min);
   EXPECT_EQ(crate.supervision.maxRestarts, 3);
@@ -187,11 +189,14 @@ TEST(ParseDuration, NeedsAUnit) {
     EXPECT_THROW(static_cast<void>(parseDuration(text)), std::invalid_argument) << text;
 }
 
-TEST_F(ReadCrateTest, OnlyTheStallLimitCanBeOff) {
-  EXPECT_EQ(parseStallLimit("off"), 0ms);
-  EXPECT_EQ(parseStallLimit("2s"), 2s);
-  EXPECT_THAT(errorsOf("[supervision]\nstall-limit = \"5\"\n"),
-              HasSubstr("\"5\": write a time with its unit, such as 500ms, 2s or 1min, or off\n"));
+TEST_F(ReadCrateTest, OnlyTheLimitsOfServersCanBeOff) {
+  EXPECT_EQ(parseDurationOrOff("off"), 0ms);
+  EXPECT_EQ(parseDurationOrOff("2s"), 2s);
+  for (const std::string key : {"stall-limit", "busy-limit"})
+    EXPECT_THAT(
+        errorsOf("[supervision]\n" + key + " = \"5\"\n"),
+        HasSubstr(key +
+                  ": \"5\": write a time with its unit, such as 500ms, 2s or 1min, or off\n"));
   for (const std::string key :
        {"start-time", "stop-time", "first-pause", "last-pause", "restart-window"})
     EXPECT_THAT(errorsOf("[supervision]\n" + key + " = \"off\"\n"),
@@ -205,6 +210,9 @@ TEST_F(ReadCrateTest, AKeyOfAnotherTableIsNamedWithItsTable) {
   EXPECT_THAT(
       errorsOf("stall-limit = \"2s\"\n" + server),
       HasSubstr("unknown key \"stall-limit\"; it belongs to [supervision], or to a process"));
+  EXPECT_THAT(
+      errorsOf("busy-limit = \"2s\"\n" + server),
+      HasSubstr("unknown key \"busy-limit\"; it belongs to [supervision], or to a process"));
   EXPECT_THAT(errorsOf("needs = [\"a\"]\n" + server), HasSubstr("it belongs to a process"));
   EXPECT_THAT(errorsOf(server + "baud = 9600\n"),
               HasSubstr("unknown key \"baud\"; it belongs to [[server]] of program \"serial\""));

@@ -98,6 +98,41 @@ TEST_F(ServerWatchTest, AServerThatTakesMessagesBetweenTheLooksIsNotStalled) {
   EXPECT_FALSE(watch_.isStalled(::getpid()));
 }
 
+TEST_F(ServerWatchTest, AServerThatWorksOnOneRequestIsBusyWithIt) {
+  connect();
+  send();
+  auto request = server_.receive();
+  ASSERT_TRUE(request);
+  watch_.look();
+  EXPECT_FALSE(watch_.workOf(::getpid())) << "seen once";
+
+  watch_.look();
+
+  const auto work = watch_.workOf(::getpid());
+  ASSERT_TRUE(work);
+  EXPECT_EQ(work->server, "one");
+  EXPECT_EQ(work->handling.type, static_cast<std::uint16_t>(MessageType::int32));
+  EXPECT_GT(work->forNs, 0);
+  EXPECT_FALSE(watch_.workOf(::getppid()));
+}
+
+TEST_F(ServerWatchTest, TheNextRequestIsOtherWork) {
+  connect();
+  send();
+  send();
+  auto request = server_.receive();
+  watch_.look();
+  watch_.look();
+  ASSERT_TRUE(watch_.workOf(::getpid()));
+  EXPECT_EQ(server_.reply(std::move(request)), ReplyResult::sent);
+  request = server_.receive();
+  ASSERT_TRUE(request);
+
+  watch_.look();
+
+  EXPECT_FALSE(watch_.workOf(::getpid()));
+}
+
 TEST_F(ServerWatchTest, RemovesTheFilesOfDeadProcesses) {
   Program program({MPF_TEST_INT32_SERVER, "--backplane", backplane_.name()});
   ASSERT_NE(program.waitForLine("serving"), "");

@@ -24,6 +24,7 @@ class ServiceTest : public testing::Test {
     plan.startTime = 5s;
     plan.stopTime = 2s;
     plan.stallLimit = 10s;
+    plan.busyLimit = 5s;
     plan.firstPause = 100ms;
     plan.lastPause = 300ms;
     plan.maxRestarts = 3;
@@ -41,6 +42,7 @@ class ServiceTest : public testing::Test {
     service_.becameReady();
   }
   void end(const ProcessEnd& end) { service_.ended(end, now_); }
+  static Work work(std::chrono::nanoseconds time) { return {"psu", {2, 7}, time.count()}; }
 
   std::int64_t now_ = 1'000'000'000;
   Service service_{planOf()};
@@ -229,10 +231,10 @@ TEST_F(ServiceTest, IsRestartedWhenItDoesNotBecomeReady) {
 
 TEST_F(ServiceTest, IsKilledWhenItIsStalledForTooLong) {
   becomeReady();
-  service_.looked(true, now_);
+  service_.looked(true, {}, now_);
   EXPECT_TRUE(service_.isStalled());
   pass(9s);
-  service_.looked(true, now_);
+  service_.looked(true, {}, now_);
   EXPECT_EQ(action(), Action::none);
   pass(1s);
 
@@ -251,7 +253,7 @@ TEST_F(ServiceTest, IsNotRestartedAgainstThePolicyWhenItIsStalledOrNotReady) {
     ASSERT_EQ(service.action(true, now_), Action::start);
     service.started(1, 1, now_);
     if (isReady) service.becameReady();
-    service.looked(isReady, now_);
+    service.looked(isReady, {}, now_);
     pass(10s);
     ASSERT_NE(service.action(true, now_), Action::none);
     service.ended(killedBy(SIGKILL), now_);
@@ -262,11 +264,11 @@ TEST_F(ServiceTest, IsNotRestartedAgainstThePolicyWhenItIsStalledOrNotReady) {
 
 TEST_F(ServiceTest, AStallThatEndsIsForgotten) {
   becomeReady();
-  service_.looked(true, now_);
+  service_.looked(true, {}, now_);
   pass(9s);
-  service_.looked(false, now_);
+  service_.looked(false, {}, now_);
   pass(5s);
-  service_.looked(true, now_);
+  service_.looked(true, {}, now_);
   pass(9s);
 
   EXPECT_EQ(action(), Action::none);
@@ -279,10 +281,54 @@ TEST_F(ServiceTest, WithoutALimitAStalledServerContinues) {
   ASSERT_EQ(service.action(true, now_), Action::start);
   service.started(1, 1, now_);
   service.becameReady();
-  service.looked(true, now_);
+  service.looked(true, {}, now_);
   pass(24h);
 
   EXPECT_EQ(service.action(true, now_), Action::none);
+}
+
+TEST_F(ServiceTest, IsKilledWhenItIsBusyWithOneRequestForTooLong) {
+  becomeReady();
+  service_.looked(false, work(4999ms), now_);
+  EXPECT_EQ(action(), Action::none);
+  pass(1h);
+  EXPECT_EQ(action(), Action::none) << "the request may have ended since the look";
+
+  service_.looked(false, work(5s), now_);
+
+  EXPECT_EQ(service_.endReason(), EndReason::busy);
+  EXPECT_EQ(action(), Action::kill);
+  end(killedBy(SIGKILL));
+  EXPECT_EQ(service_.state(), ServiceState::pausing);
+  EXPECT_EQ(service_.reason(), "busy with int32 cmd=7 for 5.0 s");
+}
+
+TEST_F(ServiceTest, WithoutALimitABusyServerContinues) {
+  auto plan = planOf();
+  plan.busyLimit = 0ms;
+  Service service(plan);
+  ASSERT_EQ(service.action(true, now_), Action::start);
+  service.started(1, 1, now_);
+  service.becameReady();
+
+  service.looked(false, work(24h), now_);
+
+  EXPECT_EQ(service.action(true, now_), Action::none);
+}
+
+TEST_F(ServiceTest, IsBusyWithARequestThatTakesASecond) {
+  start();
+  service_.looked(false, work(2s), now_);
+  EXPECT_FALSE(service_.work()) << "not while it is starting";
+  service_.becameReady();
+
+  service_.looked(false, work(999ms), now_);
+  EXPECT_FALSE(service_.work());
+  service_.looked(false, work(1s), now_);
+  EXPECT_TRUE(service_.work());
+
+  service_.looked(false, {}, now_);
+  EXPECT_FALSE(service_.work());
 }
 
 TEST_F(ServiceTest, AProcessThatCannotBeExecutedIsTriedAgain) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Supervisor: crates that run: processes that die, stall and are replaced; supervisors that are
-// killed.
+// Supervisor: crates that run: processes that die and are replaced; supervisors that are killed.
 #include "crate/supervisor/supervisor.h"
 
 #include <sys/wait.h>
@@ -82,18 +81,6 @@ TEST_F(SupervisorTest, ARequestedStopLeavesNoCapsule) {
 
   EXPECT_THAT(capsules, HasSubstr("restart"));
   EXPECT_EQ(std::count(capsules.begin(), capsules.end(), '\n'), 2) << capsules;
-}
-
-TEST_F(SupervisorTest, RestartsAServerThatIsStalled) {
-  run(kServer, "stall-limit = \"100ms\"\n");
-  waitForState("int32", "ready");
-  const auto before = pidOf("int32");
-  mpf::test::Program client({MPF, "call", "Int32", "int32", "--count", "1000000000"});
-  ::kill(before, SIGSTOP);
-
-  waitForNew("int32", before);
-
-  EXPECT_THAT(process("int32").at("reason").get<std::string>(), HasSubstr("stalled for"));
 }
 
 TEST_F(SupervisorTest, AProcessStartsAfterThoseThatItNeeds) {
