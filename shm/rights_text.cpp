@@ -43,6 +43,10 @@ Rights checkServerRights(const Rights& rights) {
   return rights;
 }
 
+Rights Rights::of(std::string_view mode, std::string_view group) {
+  return {.mode = parseMode(std::string(mode)), .group = parseGroup(std::string(group))};
+}
+
 std::uint32_t parseGroup(const std::string& name) {
   group entry{};
   group* found = nullptr;

@@ -4,6 +4,7 @@
 //   {}                            the user of this process
 //   {.mode = 0660, .group = gid}  and all members of the group `gid`
 //   {.mode = 0666}                every user of the host
+//   Rights::of("0660", "mpf")     all members of the group "mpf", as `--mode 0660 --group mpf`
 //
 // A peer needs read and write permission. Without it, the peer cannot connect.
 #pragma once
@@ -11,6 +12,7 @@
 #include <sys/types.h>
 
 #include <cstdint>
+#include <string_view>
 
 #include <mpf/detail/cpp20.h>
 
@@ -26,6 +28,11 @@ struct Rights {
   mode_t mode = 0600;
   std::uint32_t group = ~std::uint32_t{0};
   std::uint32_t user = ~std::uint32_t{0};
+  // The rights that the options --mode and --group of a server program give.
+  //   mode    octal, from "0600" to "0666"
+  //   group   its name
+  //   throws  std::invalid_argument that names the wrong value
+  [[nodiscard]] static Rights of(std::string_view mode, std::string_view group);
   bool operator==(const Rights&) const = default;
 };
 

@@ -44,6 +44,15 @@ TEST(RightsText, AServerBelongsToItsOwnUser) {
 
 TEST(RightsText, AGroupIsFoundByItsName) { EXPECT_EQ(parseGroup("root"), 0u); }
 
+TEST(RightsText, RightsAreOfAModeAndAGroup) {
+  EXPECT_EQ(Rights::of("0660", "root"), (Rights{.mode = 0660, .group = 0}));
+  EXPECT_THAT(whatOf<std::invalid_argument>([] { static_cast<void>(Rights::of("0770", "root")); }),
+              testing::StartsWith("0770: "));
+  EXPECT_THAT(
+      whatOf<std::invalid_argument>([] { static_cast<void>(Rights::of("0660", "nobodys")); }),
+      testing::StartsWith("nobodys: "));
+}
+
 TEST(RightsText, AnUnknownGroupIsNamed) {
   EXPECT_THAT(
       whatOf<std::invalid_argument>([] { static_cast<void>(parseGroup("no-such-group-of-mpf")); }),
