@@ -155,11 +155,14 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
       parsed.incarnation = *server;
       return parsed;
     }
-    case NameKind::bulk:
-      if (parts.size() != 6 || (parts[4] != "0" && parts[4] != "1") ||
-          !tryNumber<std::uint32_t>(parts[5]))
-        return std::nullopt;
+    case NameKind::bulk: {
+      const auto side = parts.size() == 6 ? tryNumber<std::uint32_t>(parts[4]) : std::nullopt;
+      const auto segment = side && *side < 2 ? tryNumber<std::uint32_t>(parts[5]) : std::nullopt;
+      if (!segment || parts[4].size() != 1) return std::nullopt;
+      parsed.side = *side;
+      parsed.segment = *segment;
       [[fallthrough]];
+    }
     case NameKind::clientWindow:
     case NameKind::hints:
     case NameKind::pendingBind:

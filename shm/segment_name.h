@@ -58,6 +58,7 @@ struct SegmentName {
     // incarnation in the name; 0 for a server window, whose name contains none
     std::uint64_t incarnation{};
     std::uint64_t serverWindow{};  // link only
+    std::uint32_t side{}, segment{};  // bulk only
   };
   // Parses a name in /dev/shm; nullopt if it is not a name that MPF gives.
   static std::optional<Parsed> tryParse(std::string_view name);

@@ -49,17 +49,6 @@ bool isRemoved(const FileDescriptor& file) {
   return ::fstat(file.get(), &status) == 0 && status.st_nlink == 0;
 }
 
-// Side and number in the name of a bulk segment, which ends in ".<side>.<n>".
-std::optional<std::pair<std::uint32_t, std::uint32_t>> placeOf(const std::string& name) {
-  const auto last = name.rfind('.');
-  const auto before = last == std::string::npos ? last : name.rfind('.', last - 1);
-  if (before == std::string::npos) return std::nullopt;
-  const auto number = [&](std::size_t at) {
-    return static_cast<std::uint32_t>(std::strtoul(name.c_str() + at + 1, nullptr, 10));
-  };
-  return std::pair(number(before), number(last));
-}
-
 // Closes links that were removed while their server lived. Returns true if its window was removed,
 // too. The process is asked whether it lives after the files were seen without a name: files that
 // peers removed because of a death are kept.
@@ -141,13 +130,13 @@ void SegmentWitness::openLink(const std::string& name, const SegmentName::Parsed
 }
 
 void SegmentWitness::openBulk(const std::string& name, const SegmentName::Parsed& parsed) {
-  const auto place = placeOf(name);
+  const std::pair place(parsed.side, parsed.segment);
   for (auto& [pid, process] : processes_) {
     for (auto& [incarnation, window] : process.windows) {
       const auto link = window.links.find(parsed.incarnation);
-      if (!place || link == window.links.end() || link->second.bulks.contains(*place)) continue;
+      if (link == window.links.end() || link->second.bulks.contains(place)) continue;
       if (files() >= maxFiles_) return;  // a link is worth more than a pool
-      if (auto file = openSegment(name)) link->second.bulks.emplace(*place, std::move(file));
+      if (auto file = openSegment(name)) link->second.bulks.emplace(place, std::move(file));
     }
   }
 }

@@ -27,6 +27,8 @@ TEST(SegmentName, ParsesEachKindOfNameThatItBuilds) {
   EXPECT_EQ(link->incarnation, kKey);
   EXPECT_EQ(bulk->kind, NameKind::bulk);
   EXPECT_EQ(bulk->incarnation, kKey) << "a bulk segment has the incarnation of its link";
+  EXPECT_EQ(bulk->side, 1u);
+  EXPECT_EQ(bulk->segment, 255u);
   for (const auto kind :
        {NameKind::clientWindow, NameKind::hints, NameKind::pendingBind, NameKind::fifo}) {
     const auto keyed = SegmentName::tryParse(SegmentName::keyed("crate-1", kind, kWindow));
