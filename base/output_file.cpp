@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <utility>
 
 #include "base/system_call.h"
@@ -35,6 +36,19 @@ void OutputFile::close() {
   write({});  // truncates the file if nothing has been written
   // Some file systems report a full disk only at close().
   checkCall(::close(file_.release()), "write", path_);
+}
+
+void replaceFile(const std::string& path, std::string_view text, mode_t mode) {
+  const auto fresh = path + ".new";
+  try {
+    OutputFile file(fresh, mode);
+    file.write(text);
+    file.close();
+    checkCall(std::rename(fresh.c_str(), path.c_str()), "rename", path);
+  } catch (...) {
+    ::unlink(fresh.c_str());
+    throw;
+  }
 }
 
 }  // namespace mpf

@@ -38,4 +38,10 @@ class OutputFile {
   bool isBegun_ = false;
 };
 
+// Replaces a file by one with this text, or creates it. A reader sees the old or the new one, never
+// a part; so does the next start, when this process is killed.
+//   throws  std::system_error; then the old file is there, and no part of the new one, which would
+//           take space on a full disk
+void replaceFile(const std::string& path, std::string_view text, mode_t mode);
+
 }  // namespace mpf

@@ -2,11 +2,9 @@
 #include "crate/capsule/capsule_store.h"
 
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <fmt/format.h>
 #include <ranges>
 #include <string_view>
@@ -44,28 +42,14 @@ std::string nameOf(const nlohmann::ordered_json& capsule, std::uint64_t number) 
                      kEnding);
 }
 
-// Writes a file that gets its name when it is complete. After a failure its part is removed: on a
-// full disk, parts would take the space that becomes free.
-void writeWhole(const std::string& path, const std::string& text) {
-  const auto fresh = path + ".new";
-  try {
-    OutputFile file(fresh, 0600);
-    file.write(text);
-    file.close();
-    checkCall(std::rename(fresh.c_str(), path.c_str()), "rename", path);
-  } catch (...) {
-    ::unlink(fresh.c_str());
-    throw;
-  }
-}
-
 }  // namespace
 
 std::string CapsuleStore::add(const nlohmann::ordered_json& capsule) const {
   if (::mkdir(folder_.c_str(), 0700) != 0 && errno != EEXIST)
     throwSystemError(errno, "create", folder_.string());
   const auto path = (folder_ / nameOf(capsule, freshNumber(list()))).string();
-  writeWhole(path, capsule.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  replaceFile(path, capsule.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n",
+              0600);
   prune(path);
   return path;
 }

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "crate/supervisor/crate_state.h"
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "base/output_file.h"
-#include "base/system_call.h"
 #include "base/whole_file.h"
 #include "crate/supervisor/child_process.h"
 #include "shm/shortage.h"
@@ -59,11 +57,8 @@ void CrateState::write(const std::string& path) const {
                    {"context", one.context}});
   }
   const nlohmann::json json{{"boot", bootId()}, {"crate", file}, {"processes", all}};
-  const auto fresh = path + ".new";
-  OutputFile output(fresh, 0600);
-  output.write(json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  output.close();
-  checkCall(std::rename(fresh.c_str(), path.c_str()), "rename", path);
+  replaceFile(path, json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n",
+              0600);
 }
 
 }  // namespace mpf::crate

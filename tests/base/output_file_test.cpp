@@ -60,5 +60,26 @@ TEST(OutputFile, ThrowsAtConstructionIfItCannotBeWritten) {
             "open " + missing + ": No such file or directory");
 }
 
+TEST(ReplaceFile, ReplacesTheWholeFile) {
+  const test::TemporaryFolder folder;
+  const auto path = folder.write("x", "old and longer");
+
+  replaceFile(path, "new", 0600);
+
+  EXPECT_EQ(textOf(path), "new");
+  EXPECT_FALSE(std::filesystem::exists(path + ".new"));
+}
+
+TEST(ReplaceFile, LeavesNoPartAfterAFailure) {
+  const test::TemporaryFolder folder;
+  const auto path = folder.file("x");
+  std::filesystem::create_directory(path);
+
+  EXPECT_EQ(errorOf([&] { replaceFile(path, "new", 0600); }),
+            "rename " + path + ": Is a directory");
+
+  EXPECT_FALSE(std::filesystem::exists(path + ".new"));
+}
+
 }  // namespace
 }  // namespace mpf
