@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <ctime>
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <functional>
 #include <system_error>
@@ -29,6 +31,15 @@ std::string withoutNumbers(const std::string& line) {
   for (const char one : line)
     if (std::isdigit(static_cast<unsigned char>(one)) == 0) text += one;
   return text;
+}
+
+// Whether the next byte of the file begins a line.
+bool isAtLineStart(const FileDescriptor& file) {
+  struct stat status{};
+  char last = '\n';
+  if (::fstat(file.get(), &status) == 0 && status.st_size != 0)
+    static_cast<void>(::pread(file.get(), &last, 1, status.st_size - 1));
+  return last == '\n';
 }
 
 }  // namespace
@@ -74,20 +85,21 @@ LogFollower::Log LogFollower::open(const std::string& path) const {
   Log log;
   log.path = path;
   log.file = FileDescriptor(
-      checkCall(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "open", path));
+      checkCall(::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0600), "open", path));
   log.watch = checkCall(::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY),
                         "inotify_add_watch", path);
   return log;
 }
 
-// If the log has more new bytes than one call reads, its last line is joined with the next one.
-void LogFollower::endLine(const std::string& name) {
+void LogFollower::note(const std::string& name, const std::string& text) {
   const auto found = logs_.find(name);
   if (found == logs_.end()) return;
   auto& log = found->second;
-  if (!readBytes(log) || log.partial.empty() || log.partial.back() == '\n') return;
-  log.partial += '\n';
-  hasMore_ = true;
+  if (isReplaced(log)) tryReopen(log);
+  const auto line =
+      fmt::format("{}{:%F %T} {}", kNotePrefix, fmt::localtime(std::time(nullptr)), text);
+  const auto bytes = (isAtLineStart(log.file) ? "" : "\n") + line + "\n";
+  if (::write(log.file.get(), bytes.data(), bytes.size()) > 0) log.notes.push_back(line);
 }
 
 std::string LogFollower::takeLines() {
@@ -133,8 +145,7 @@ std::string LogFollower::prefix(const std::string& name) const {
   return fmt::format("\x1b[{}m{}\x1b[0m | ", colour, name);
 }
 
-// Returns whether it has read the whole file.
-bool LogFollower::readBytes(Log& log) {
+void LogFollower::readBytes(Log& log) {
   std::array<char, 65536> bytes{};
   struct stat status{};
   if (::fstat(log.file.get(), &status) == 0 && status.st_size < log.offset) log.offset = 0;
@@ -146,7 +157,6 @@ bool LogFollower::readBytes(Log& log) {
     log.partial.append(bytes.data(), static_cast<std::size_t>(length));
   }
   hasMore_ = hasMore_ || log.offset >= enough;
-  return log.offset < enough;
 }
 
 void LogFollower::readNew(const std::string& name, Log& log, std::string& to) {
@@ -165,13 +175,21 @@ std::string LogFollower::takeWhole(Log& log) {
   std::size_t begin = 0;
   for (auto end = log.partial.find('\n'); end != std::string::npos;
        end = log.partial.find('\n', begin)) {
-    folded += log.folder.fold(printable(log.partial.substr(begin, end - begin)));
+    const auto line = log.partial.substr(begin, end - begin);
+    if (!takeNote(log, line)) folded += log.folder.fold(printable(line));
     begin = end + 1;
   }
   log.partial.erase(0, begin);
   if (log.partial.size() > kLongestLine)
     folded += log.folder.fold(printable(std::exchange(log.partial, {})));
   return folded + log.folder.finish();
+}
+
+bool LogFollower::takeNote(Log& log, const std::string& line) {
+  const auto found = std::ranges::find(log.notes, line);
+  if (found == log.notes.end()) return false;
+  log.notes.erase(log.notes.begin(), std::next(found));
+  return true;
 }
 
 // Removes the first half of a log that is too long. The file system removes it as a whole, so no

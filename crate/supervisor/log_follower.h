@@ -4,6 +4,8 @@
 // repeat, the first three are copied, and the others are counted if the count is shorter than they.
 //
 //   NAME.log ─ pread ─► "NAME | line"
+//      ▲
+//      └─ note(): starts and ends of the process
 //
 // Threads  one.
 // Crash    the processes write to files, so they never wait for the supervisor.
@@ -11,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <string>
 
@@ -18,6 +21,8 @@
 
 namespace mpf::crate {
 
+// Lines of the supervisor in the log of a process begin with it.
+inline constexpr const char* kNotePrefix = "-- ";
 // A log is shortened by a multiple of this.
 inline constexpr std::int64_t kLogBlockBytes = 65536;
 
@@ -51,8 +56,10 @@ class LogFollower {
   // Follows a log from its present end; it need not exist.
   //   throws  std::system_error; then it is not followed
   void add(const std::string& name, const std::string& path);
-  // The process has ended: what it wrote last is a whole line, also without a newline.
-  void endLine(const std::string& name);
+  // Appends a line to a log, such as "-- 2026-11-30 10:39:27 started, pid 18294", also if the
+  // process has not ended its last line. takeLines() does not return it. Without space on the disk,
+  // the line is missing.
+  void note(const std::string& name, const std::string& text);
   // Readable when a log has grown.
   [[nodiscard]] int descriptor() const noexcept { return events_.get(); }
   // Returns new lines, at most about a megabyte of each log; hasMore() tells whether others follow.
@@ -70,14 +77,16 @@ class LogFollower {
     int watch = -1;
     std::int64_t offset = 0;
     std::string partial;  // a line without its end
+    std::deque<std::string> notes;  // lines of note() that were not read yet
     LineFolder folder;
   };
   [[nodiscard]] Log open(const std::string& path) const;
   [[nodiscard]] static bool isReplaced(const Log& log);
   void tryReopen(Log& log);
-  bool readBytes(Log& log);
+  void readBytes(Log& log);
   void readNew(const std::string& name, Log& log, std::string& to);
   static std::string takeWhole(Log& log);
+  static bool takeNote(Log& log, const std::string& line);
   void limit(Log& log) const;
   [[nodiscard]] std::string prefix(const std::string& name) const;
 

@@ -136,6 +136,7 @@ void Supervisor::start(Member& member) {
     member.isNotified = false;
     service.started(child.pid(), child.startTicks(), Clock::nowNs());
     capsuleWriter_.watch(service);
+    logs_.note(plan.name, fmt::format("started, pid {}", child.pid()));
     nextLookNs_ = 0;
     tryRecord();
     if (const auto why = child.open(); !why.empty())
@@ -144,6 +145,7 @@ void Supervisor::start(Member& member) {
   } catch (const std::exception& error) {
     capsuleWriter_.forget(service);  // its child, if there is one, ends by itself
     service.startFailed(fmt::format("cannot be started: {}", error.what()), Clock::nowNs());
+    logs_.note(plan.name, service.reason());
     log(service, service.reason());
   }
 }
@@ -200,7 +202,6 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
   member.isAdopted = false;
   member.adopted.reset();
-  logs_.endLine(service.plan().name);
   attempt([&] { capsuleWriter_.look(); });
   const auto capsule = capsuleWriter_.collect(service, end);
   service.ended(end, Clock::nowNs());
@@ -211,6 +212,12 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   const auto next = service.state() == ServiceState::pausing
                         ? fmt::format("restart {}", service.restarts())
                         : std::string(toString(service.state()));
+  logs_.note(service.plan().name,
+             fmt::format("{}; {}",
+                         service.endReason() == EndReason::none
+                             ? end.text()
+                             : fmt::format("{}, {}", service.reason(), end.text()),
+                         next));
   log(service, fmt::format("{} after {}, pid {}; {}{}", end.text(), durationText(aliveNs), pid,
                            next, capsule.empty() ? "" : "; see `mpf capsule " + capsule + "`"));
   if (service.state() == ServiceState::failed)

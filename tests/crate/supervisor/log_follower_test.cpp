@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <system_error>
 
+#include "base/whole_file.h"
 #include "tests/support/no_descriptors.h"
 #include "tests/support/temporary_folder.h"
 
@@ -66,20 +67,47 @@ TEST_F(LogFollowerTest, ReturnsWholeLinesFromItsBeginning) {
   EXPECT_EQ(follower.takeLines(), "");
 }
 
-TEST_F(LogFollowerTest, TheEndOfTheProcessEndsItsLastLine) {
+TEST_F(LogFollowerTest, ANoteIsALineOfTheFileOnly) {
+  append(path_, "before\n");
+  LogFollower follower(false, 1u << 20);
+  follower.add("dac", path_);
+
+  follower.note("dac", "started, pid 7");
+  follower.note("other", "of a log that is not followed");
+  append(path_, "-- a line of the process\n");
+
+  EXPECT_EQ(follower.takeLines(), "dac | -- a line of the process\n");
+  EXPECT_THAT(readWholeFile(path_),
+              testing::MatchesRegex("before\n-- [0-9]{4}-[0-9]{2}-[0-9]{2} [0-9:]{8} started, pid "
+                                    "7\n-- a line of the process\n"));
+}
+
+TEST_F(LogFollowerTest, ANoteEndsTheLastLineOfAProcess) {
   LogFollower follower(false, 1u << 20);
   follower.add("dac", path_);
   append(path_, "one\nlast wor");
   EXPECT_EQ(follower.takeLines(), "dac | one\n");
   append(path_, "ds");
 
-  follower.endLine("dac");
-
-  EXPECT_TRUE(follower.hasMore());
+  follower.note("dac", "SIGSEGV; restart 1");
   append(path_, "of the next\n");
+
   EXPECT_EQ(follower.takeLines(), "dac | last words\ndac | of the next\n");
-  follower.endLine("dac");
-  EXPECT_FALSE(follower.hasMore());
+  EXPECT_THAT(readWholeFile(path_),
+              testing::ContainsRegex("last words\n-- .* SIGSEGV; restart 1\n"));
+}
+
+TEST_F(LogFollowerTest, ANoteIsInTheFileThatHasReplacedTheLog) {
+  LogFollower follower(false, 1u << 20);
+  follower.add("dac", path_);
+  std::filesystem::rename(path_, path_ + ".1");
+  append(path_, "");
+
+  follower.note("dac", "started, pid 7");
+
+  EXPECT_THAT(readWholeFile(path_), HasSubstr("started, pid 7"));
+  EXPECT_EQ(readWholeFile(path_ + ".1"), "");
+  EXPECT_EQ(follower.takeLines(), "");
 }
 
 TEST_F(LogFollowerTest, ALogThatCouldNotBeOpenedCanBeAddedLater) {

@@ -52,6 +52,25 @@ TEST_F(SupervisorTest, RestartsAProcessThatDies) {
   EXPECT_TRUE(isReplying("Int32"));
 }
 
+TEST_F(SupervisorTest, TheLogShowsEachStartAndEnd) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto before = pidOf("int32");
+  ::kill(before, SIGSEGV);
+  waitForNew("int32", before);
+  const auto after = pidOf("int32");
+  ASSERT_EQ(runCommand(MPF " stop int32 --wait 900").status, 0);
+
+  const auto log = readWholeFile(folder().log("int32"));
+
+  EXPECT_THAT(log, testing::ContainsRegex(fmt::format(
+                       "-- [-0-9]+ [:0-9]+ started, pid {}\n(.*\n)*-- [-0-9]+ [:0-9]+ SIGSEGV; "
+                       "restart 1\n-- [-0-9]+ [:0-9]+ started, pid {}\n(.*\n)*-- [-0-9]+ [:0-9]+ "
+                       "stopped by request, exit status 0; stopped\n",
+                       before, after)));
+  stop();
+}
+
 TEST_F(SupervisorTest, KeepsACapsuleOfAProcessThatDies) {
   run(kServer);
   waitForState("int32", "ready");
@@ -296,7 +315,8 @@ TEST_F(SupervisorTest, PrintsTheLinesOfItsProcesses) {
 
   EXPECT_EQ(supervisor_->waitForLine("one"), "talker | one");
   waitForState("talker", "ready");
-  EXPECT_EQ(runCommand(MPF " logs talker").output, "one\n");
+  EXPECT_THAT(runCommand(MPF " logs talker").output,
+              testing::MatchesRegex("-- [-0-9]+ [0-9:]+ started, pid [0-9]+\none\n"));
 }
 
 TEST_F(SupervisorTest, AProcessThatDiesDuringTheShutdownIsNotStartedAgain) {
