@@ -18,6 +18,7 @@
 #include "base/printable.h"
 #include "base/signal_name.h"
 #include "base/system_call.h"
+#include "base/whole_file.h"
 #include "crate/capsule/core_file.h"
 #include "crate/capsule/link_record.h"
 #include "schema/text.h"
@@ -138,18 +139,9 @@ Tree endOfLog(const std::string& path, std::size_t limit) {
   Tree tree{{"file", path}};
   if (path.empty()) return nullptr;
   try {
-    const FileDescriptor file(
-        checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK), "open", path));
-    struct stat status{};
-    checkCall(::fstat(file.get(), &status), "look at", path);
-    const auto size = static_cast<std::uint64_t>(std::max<off_t>(0, status.st_size));
-    std::string text(std::min<std::uint64_t>(size, limit), '\0');
-    const auto got = checkCall(
-        ::pread(file.get(), text.data(), text.size(), static_cast<off_t>(size - text.size())),
-        "read", path);
-    text.resize(static_cast<std::size_t>(got));
-    tree["leftOutBytes"] = size - text.size();
-    tree["text"] = printableLines(text);
+    const auto end = readEndOfFile(path, limit);
+    tree["leftOutBytes"] = end.leftOutBytes;
+    tree["text"] = printableLines(end.text);
   } catch (const std::exception& error) {
     tree["problem"] = error.what();
   }

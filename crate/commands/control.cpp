@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <memory>
+#include <sstream>
 #include <system_error>
 #include <thread>
 
@@ -17,9 +18,11 @@
 #include "base/print_error.h"
 #include "base/printable.h"
 #include "base/run_main.h"
+#include "base/whole_file.h"
 #include "crate/commands/commands.h"
 #include "crate/supervisor/control_protocol.h"
 #include "crate/supervisor/crate_state.h"
+#include "crate/supervisor/log_follower.h"
 #include "tools/arguments.h"
 
 namespace mpf::crate {
@@ -51,6 +54,21 @@ bool isReady(const json& process) {
           process.at("upS") >= kLookS);
 }
 
+// What a process that does not run printed last, with ": " in front; empty: nothing since its
+// start, or it cannot be read.
+std::string lastWords(const json& process) try {
+  constexpr std::size_t kEnough = 65536;
+  std::istringstream log(readEndOfFile(process.at("log"), kEnough).text);
+  std::string last;
+  for (std::string line; std::getline(log, line);) {
+    if (!line.starts_with(kNotePrefix)) last = line;
+    else if (line.find(" started, pid ") != std::string::npos) last.clear();
+  }
+  return last.empty() ? last : ": " + last;
+} catch (const std::exception&) {
+  return {};
+}
+
 // Waits until the process is in one of the states in which nothing more happens, and prints it.
 //   throws  std::runtime_error when it has failed, or is in another state at the deadline
 void waitFor(const CrateFolder& folder, const ControlArguments& arguments, const Deadline& deadline,
@@ -64,14 +82,14 @@ void waitFor(const CrateFolder& folder, const ControlArguments& arguments, const
       return;
     }
     if (state == "failed")
-      throw std::runtime_error(fmt::format("{} has failed: {}; see `mpf logs {}`",
+      throw std::runtime_error(fmt::format("{} has failed: {}{}; see `mpf logs {}`",
                                            arguments.process, process.value("reason", ""),
-                                           arguments.process));
+                                           lastWords(process), arguments.process));
     if (deadline.hasPassed()) {
       const auto reason = process.value("reason", "");
-      throw std::runtime_error(fmt::format("{} is still {} after {}{}{}", arguments.process, state,
-                                           timeText(arguments.wait), reason.empty() ? "" : ": ",
-                                           reason));
+      throw std::runtime_error(fmt::format(
+          "{} is still {} after {}{}{}{}", arguments.process, state, timeText(arguments.wait),
+          reason.empty() ? "" : ": ", reason, state == "pausing" ? lastWords(process) : ""));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

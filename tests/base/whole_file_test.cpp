@@ -36,5 +36,18 @@ TEST(ReadWholeFile, NamesTheFileThatCannotBeRead) {
       << "a folder";
 }
 
+TEST(ReadEndOfFile, ReturnsTheLastBytes) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("file", "0123456789");
+
+  const auto end = readEndOfFile(file, 3);
+
+  EXPECT_EQ(end.text, "789");
+  EXPECT_EQ(end.leftOutBytes, 7u);
+  EXPECT_EQ(readEndOfFile(file, 11).text, "0123456789");
+  EXPECT_EQ(readEndOfFile(file, 11).leftOutBytes, 0u);
+  EXPECT_THROW(static_cast<void>(readEndOfFile(folder.file("absent"), 3)), std::system_error);
+}
+
 }  // namespace
 }  // namespace mpf::test

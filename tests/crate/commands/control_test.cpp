@@ -3,6 +3,8 @@
 // they report.
 #include <sys/wait.h>
 
+#include <filesystem>
+
 #include "tests/crate/supervisor/supervisor_fixture.h"
 
 namespace mpf::crate::test {
@@ -57,6 +59,33 @@ TEST_F(ControlTest, AReloadSaysWhichProcessFails) {
 
   EXPECT_EQ(WEXITSTATUS(result.status), 1);
   EXPECT_THAT(result.output, HasSubstr("mpf reload: wrong has failed: exit status 2"));
+}
+
+TEST_F(ControlTest, AFailureIsShownWithTheLastLineOfTheProcess) {
+  run("[[program]]\nname = \"wrong\"\ncommand = [\"sh\", \"-c\", \"test -e twice && exit 2; touch "
+      "twice; echo from an earlier start; exit 2\"]\nservers = [\"never\"]\n");
+  waitForState("wrong", "failed");
+
+  const auto silent = runCommand(MPF " start wrong --wait 900 2>&1").output;
+  std::filesystem::remove(files_.file("twice"));
+  const auto result = runCommand(MPF " start wrong --wait 900 2>&1");
+
+  EXPECT_THAT(silent, HasSubstr("wrong has failed: exit status 2; see"));
+  EXPECT_EQ(WEXITSTATUS(result.status), 1);
+  EXPECT_THAT(result.output,
+              HasSubstr("wrong has failed: exit status 2: from an earlier start; see"));
+}
+
+TEST_F(ControlTest, APauseIsShownWithTheLastLineOfTheProcess) {
+  run("[[program]]\nname = \"wrong\"\ncommand = [\"sh\", \"-c\", \"echo why; exit 1\"]\n"
+      "servers = [\"never\"]\n",
+      "first-pause = \"15min\"\nlast-pause = \"15min\"\n");
+
+  std::string output;
+  while (output.find("pausing") == std::string::npos)
+    output = runCommand(MPF " start wrong --wait 100ms 2>&1").output;
+
+  EXPECT_THAT(output, HasSubstr("wrong is still pausing after 100ms: exit status 1: why\n"));
 }
 
 TEST_F(ControlTest, AReloadNamesEachErrorOfTheFile) {
