@@ -44,7 +44,8 @@ void CapsuleWriter::forget(const Service& service) {
 std::string CapsuleWriter::collect(const Service& service, const ProcessEnd& end) {
   std::string path;
   try {
-    if (service.endReason() != EndReason::stopRequest) path = write(service, end);
+    if (service.endReason() != EndReason::stopRequest && !service.isRepeatedFailure(end))
+      path = write(service, end);
   } catch (const std::exception& error) {
     printError("mpf run: {}: cannot write a capsule: {}\n", service.plan().name, error.what());
   }

@@ -35,8 +35,8 @@ class CapsuleWriter {
   void watch(const Service& service);
   void forget(const Service& service);
   // Call when the process of `service` has ended, before Service::ended() and before its files are
-  // removed. Returns the path of the capsule; empty: its stop was requested, or the capsule could
-  // not be written, which has been reported.
+  // removed. Returns the path of the capsule; empty: its stop was requested, a start has
+  // failed as the one before, or the capsule could not be written, which has been reported.
   std::string collect(const Service& service, const ProcessEnd& end);
 
  private:

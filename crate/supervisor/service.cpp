@@ -58,6 +58,7 @@ void Service::started(pid_t pid, std::uint64_t startTicks, std::int64_t nowNs) {
   startedNs_ = nowNs;
   readyAtLatestNs_ = nowNs + nanoseconds(plan_.startTime);
   isRestartRequested_ = false;
+  wasReady_ = false;
   endReason_ = EndReason::none;
   missing_.clear();
   stalledSinceNs_.reset();
@@ -80,13 +81,16 @@ void Service::startFailed(const std::string& why, std::int64_t nowNs) {
 }
 
 void Service::becameReady() {
-  if (state_ == ServiceState::starting) state_ = ServiceState::ready;
+  if (state_ != ServiceState::starting) return;
+  state_ = ServiceState::ready;
+  wasReady_ = true;
 }
 
 void Service::ended(const ProcessEnd& end, std::int64_t nowNs) {
   pid_ = 0;
   stalledSinceNs_.reset();
   work_.reset();
+  failedStart_ = wasReady_ ? "" : end.text();
   // The reason of a restart that the supervisor decided stays.
   if (state_ != ServiceState::stopping) reason_ = end.text();
   if (isStopRequested_) {

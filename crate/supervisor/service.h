@@ -99,6 +99,11 @@ class Service {
   [[nodiscard]] const std::string& missing() const noexcept { return missing_; }
   // Why the supervisor ends the process that runs; none: it does not.
   [[nodiscard]] EndReason endReason() const noexcept { return endReason_; }
+  // Whether a process that ends so was never ready, as the one before it, which ended in the same
+  // way. Call before ended().
+  [[nodiscard]] bool isRepeatedFailure(const ProcessEnd& end) const {
+    return !wasReady_ && end.text() == failedStart_;
+  }
   // Why it is not running, or was last restarted: "SIGSEGV", "stalled for 10 s".
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
 
@@ -125,6 +130,8 @@ class Service {
   bool isSignalled_ = false;  // while stopping: SIGTERM was sent
   std::optional<std::int64_t> stalledSinceNs_;
   std::optional<Work> work_;  // for at least kBusyNs
+  bool wasReady_ = false;  // the present process, or the last one
+  std::string failedStart_;  // how the last process ended if it was never ready
   EndReason endReason_ = EndReason::none;
   std::string reason_;
 };

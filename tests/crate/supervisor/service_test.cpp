@@ -331,6 +331,28 @@ TEST_F(ServiceTest, IsBusyWithARequestThatTakesASecond) {
   EXPECT_FALSE(service_.work());
 }
 
+TEST_F(ServiceTest, AStartThatFailsAsTheOneBeforeIsARepetition) {
+  const auto failAgain = [&](int status) {
+    EXPECT_EQ(action(), Action::start);
+    service_.started(100, 7, now_);
+    const auto isRepeated = service_.isRepeatedFailure(exited(status));
+    end(exited(status));
+    pass(1s);
+    return isRepeated;
+  };
+  EXPECT_FALSE(failAgain(1)) << "the first one";
+  EXPECT_TRUE(failAgain(1));
+  EXPECT_FALSE(failAgain(3)) << "another end";
+  service_.requestStart();
+
+  becomeReady();
+
+  EXPECT_FALSE(service_.isRepeatedFailure(exited(3))) << "it was ready";
+  end(exited(3));
+  pass(1s);
+  EXPECT_FALSE(failAgain(3)) << "the first one since it was ready";
+}
+
 TEST_F(ServiceTest, AProcessThatCannotBeExecutedIsTriedAgain) {
   ASSERT_EQ(action(), Action::start);
   service_.startFailed("no such file", now_);

@@ -87,6 +87,16 @@ TEST_F(SupervisorTest, KeepsACapsuleOfAProcessThatDies) {
   EXPECT_THAT(runCommand(MPF " capsule " + path).output, HasSubstr("Int32"));
 }
 
+TEST_F(SupervisorTest, StartsThatFailInTheSameWayHaveOneCapsule) {
+  run("[[program]]\nname = \"a\"\ncommand = [\"sh\", \"-c\", \"exit 1\"]\nservers = [\"never\"]\n",
+      "max-restarts = 3\n");
+
+  waitForState("a", "failed");
+
+  const auto capsules = runCommand(MPF " capsule").output;
+  EXPECT_EQ(std::count(capsules.begin(), capsules.end(), '\n'), 2) << capsules;
+}
+
 TEST_F(SupervisorTest, ARequestedStopLeavesNoCapsule) {
   run(kServer);
   waitForState("int32", "ready");
