@@ -177,6 +177,7 @@ nlohmann::ordered_json capsuleOf(const Death& death, const WitnessedProcess* wit
             {"crate", death.crate},
             {"process", death.process},
             {"command", death.command},
+            {"folder", death.folder},
             {"pid", death.pid},
             {"upNs", std::max<std::int64_t>(0, Clock::nowNs() - death.startedNs)},
             {"restarts", death.restarts},

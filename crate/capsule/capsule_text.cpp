@@ -200,9 +200,9 @@ std::string capsuleText(const Tree& capsule) {
   for (const auto& word : at(capsule, "command")) command += ' ' + text(word);
   all += fmt::format(
       "  at       {} on host {}\n  process  pid {}, crate {}, {} restarts\n"
-      "  command {}\n",
+      "  command {}\n  folder   {}\n",
       text(capsule, "at"), text(capsule, "host"), text(capsule, "pid"), text(capsule, "crate"),
-      text(capsule, "restarts"), command);
+      text(capsule, "restarts"), command, text(capsule, "folder"));
   all += coreText(capsule);
   for (const auto& server : at(capsule, "servers")) all += serverText(server);
   return all + logText(at(capsule, "log"));

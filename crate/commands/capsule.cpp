@@ -3,8 +3,11 @@
 #include "crate/capsule/capsule.h"
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <fmt/format.h>
 #include <memory>
+#include <stdexcept>
+#include <system_error>
 
 #include "base/printable.h"
 #include "crate/capsule/capsule_store.h"
@@ -22,10 +25,14 @@ struct CapsuleArguments {
   bool isJson = false;
 };
 
-int showCapsule(const CapsuleArguments& arguments) {
+int showCapsule(const CapsuleArguments& arguments) try {
   const auto capsule = readCapsule(arguments.file);
   tools::show(arguments.isJson ? tools::jsonText(capsule) + "\n" : capsuleText(capsule));
   return 0;
+} catch (const std::system_error& error) {
+  if (error.code().value() != ENOENT) throw;
+  throw std::runtime_error(fmt::format(
+      "{}: no such file; `mpf capsule` without a file lists the crash reports", arguments.file));
 }
 
 int listCapsules(const CapsuleArguments& arguments) {
@@ -56,7 +63,8 @@ void addCapsule(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
       "capsule", "Shows the crash report of a process; without a file, lists them");
   auto arguments = std::make_shared<CapsuleArguments>();
-  auto* const file = command.add_option("file", arguments->file, "A capsule");
+  auto* const file = command.add_option("file", arguments->file,
+                                        "Path of a crash report, as `mpf capsule` lists it");
   command.add_option("--folder", arguments->folder, "List the capsules of this folder")
       ->excludes(file);
   command.add_flag("--json", arguments->isJson, "Print JSON, for programs");

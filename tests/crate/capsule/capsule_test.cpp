@@ -72,6 +72,9 @@ TEST_F(CapsuleTest, IsShownByACommand) {
   EXPECT_THAT(run(file), testing::StartsWith("\"victim\" died by SIGSEGV"));
   EXPECT_EQ(Tree::parse(run(file + " --json")), readCapsule(file));
   EXPECT_THAT(run("--folder " + files_.path().string()), testing::HasSubstr(file));
+  EXPECT_EQ(
+      run("dac 2>&1"),
+      "mpf capsule: dac: no such file; `mpf capsule` without a file lists the crash reports\n");
 }
 
 TEST_F(CapsuleTest, ReportsADamagedFileByName) {

@@ -25,6 +25,13 @@ TEST(CapsuleText, SaysFirstWhatHappened) {
   EXPECT_THAT(capsuleText(capsule), testing::StartsWith("\"serial\" died by SIGSEGV"));
 }
 
+TEST(CapsuleText, ShowsTheFolderOfTheCommand) {
+  const ordered_json capsule{{"command", {"../psu_server", "psu"}}, {"folder", "/opt/lab"}};
+
+  EXPECT_THAT(capsuleText(capsule),
+              testing::HasSubstr("  command  ../psu_server psu\n  folder   /opt/lab\n"));
+}
+
 TEST(CapsuleText, ShowsAnyJson) {
   for (const auto* const text :
        {"{}", R"({"servers": 3, "log": 7, "command": "x"})",
