@@ -9,6 +9,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace mpf {
@@ -22,22 +23,19 @@ class ConfigError : public std::runtime_error {
 
 class ConfigErrors {
  public:
-  // `place` is "FILE:LINE:COLUMN", or empty.
-  void add(const std::string& place, const std::string& text) {
-    lines_.push_back(place.empty() ? text : place + ": " + text);
-  }
+  // `place` is "FILE:LINE:COLUMN", or another text, or empty.
+  void add(const std::string& place, const std::string& text);
   [[nodiscard]] bool isEmpty() const noexcept { return lines_.empty(); }
   [[nodiscard]] const std::vector<std::string>& lines() const noexcept { return lines_; }
 
-  // Throws a ConfigError with all errors, in the order in which they were found.
-  void throwIfAny() const {
-    std::string text;
-    for (const auto& line : lines_) text += (text.empty() ? "" : "\n") + line;
-    if (!text.empty()) throw ConfigError(text);
-  }
+  // Throws a ConfigError with all errors, in the order of their lines and columns; those without
+  // are last.
+  void throwIfAny() const;
 
  private:
+  using Position = std::pair<unsigned, unsigned>;  // line and column
   std::vector<std::string> lines_;
+  std::vector<Position> positions_;  // of each line
 };
 
 // The place of each key of a table, in the form in which errors begin: "FILE:LINE:COLUMN" or

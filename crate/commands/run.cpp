@@ -18,6 +18,7 @@
 #include "crate/config/process_plan.h"
 #include "crate/config/read_crate.h"
 #include "crate/supervisor/supervisor.h"
+#include "tools/text/wrap.h"
 
 namespace mpf::crate {
 namespace {
@@ -32,7 +33,7 @@ CrateFolder folderOf(const Crate& crate) { return CrateFolder::of(crate.name); }
 
 void printPlans(const Crate& crate) {
   for (const auto& plan : planProcesses(crate, folderOf(crate).path().string()))
-    fmt::print("# {}\n{}\n", plan.name, shellText(plan));
+    fmt::print("# {}, in {}\n{}\n", plan.name, plan.workingFolder, shellText(plan));
 }
 
 // Prints what a startup file means, without starting anything.
@@ -52,7 +53,9 @@ void show(const RunArguments& arguments) {
                      : arguments.checkOnly  ? source.check()
                                             : source.read();
   if (arguments.dryRun) printPlans(crate);
-  else fmt::print("{}: {} processes, no error\n", source.file(), crate.processes.size());
+  else
+    fmt::print("{}: {}, no error\n", source.file(),
+               tools::counted(crate.processes.size(), "process", "processes"));
 }
 
 int runCrate(const RunArguments& arguments) {

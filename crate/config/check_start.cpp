@@ -103,6 +103,7 @@ class StartCheck {
       check(carrier.place, [&] { checkCarrier(carrier.kind); });
     for (const auto& process : crate_.processes)
       if (process.isSound) checkProcess(process);
+      else if (process.kind.empty() && !process.command.empty()) checkProgram(process);
     const auto deadline = Deadline::after(kLongestCheck);
     for (; !programs_.empty(); programs_.pop_front()) takeErrors(programs_.front(), deadline);
   }
@@ -134,21 +135,25 @@ class StartCheck {
   void checkProcess(const Process& process) {
     const auto plan = planOf(crate_, process);
     const auto before = errors_.lines().size();
-    const auto refuse = [&](const std::string& key, const std::string& text) {
-      add(placeOf(process, key), text);
-    };
     check(placeOf(process, "backplane"), [&] { SegmentName::checkBackplane(plan.backplane); });
     for (const auto& server : plan.servers)
       check(process.placeOf("servers"), [&] { SegmentName::checkServer(server); });
-    if (const auto problem = problemOfUser(plan.user); !problem.empty()) refuse("user", problem);
+    if (const auto problem = problemOfUser(plan.user); !problem.empty())
+      add(placeOf(process, "user"), problem);
     else checkModels(process, plan.user);
+    checkProgram(process);
+    if (!process.kind.empty() && errors_.lines().size() == before) startCheck(process, {});
+  }
+
+  // Whether the program and its folder exist.
+  void checkProgram(const Process& process) {
+    const auto plan = planOf(crate_, process);
     std::error_code error;
     if (!std::filesystem::is_directory(plan.workingFolder, error))
-      return refuse(
-          "working-folder",
+      add(placeOf(process, "working-folder"),
           fmt::format("working-folder \"{}\": this host has no such folder", plan.workingFolder));
-    if (!isFound(plan)) return refuse("command", textOfAbsent(process, plan.command.front()));
-    if (!process.kind.empty() && errors_.lines().size() == before) startCheck(process, {});
+    else if (!isFound(plan))
+      add(placeOf(process, "command"), textOfAbsent(process, plan.command.front()));
   }
 
   void checkModels(const Process& process, const std::string& user) {

@@ -79,17 +79,6 @@ TEST(TomlTable, ReadsTheNamesOfATable) {
   EXPECT_THAT(names, ElementsAre("ipac", "other"));
 }
 
-TEST(ConfigErrors, AreThrownTogether) {
-  ConfigErrors errors;
-  EXPECT_NO_THROW(errors.throwIfAny());
-
-  errors.add("FILE:1:1", "one");
-  errors.add("", "two");
-
-  EXPECT_THAT([&] { errors.throwIfAny(); },
-              testing::ThrowsMessage<ConfigError>("FILE:1:1: one\ntwo"));
-}
-
 TEST(TomlTable, ReadsTablesWithTheirPlaces) {
   Parsed parsed("[tls]\nkey = \"k\"\n[[serve]]\nlocation = 1\n[[serve]]\nlocation = 2\n");
   std::vector<std::int32_t> locations;

@@ -37,6 +37,13 @@ TEST_F(RunTest, RefusesANameThatLeavesTheFolderOfCrates) {
   EXPECT_EQ(mpf("run --name x --check lab.toml").status, 0);
 }
 
+TEST_F(RunTest, ADryRunPrintsTheFolderOfEachCommand) {
+  write(kServer + "working-folder = \"/\"\n");
+
+  EXPECT_THAT(mpf("run --dry-run lab.toml").output, HasSubstr("# int32, in /\n"));
+  EXPECT_THAT(mpf("run --check lab.toml").output, HasSubstr("lab.toml: 1 process, no error"));
+}
+
 TEST_F(RunTest, ANewCrateHasANameThatItsCheckAccepts) {
   for (const std::string name : {"'a b'", "''", ".a", "a/"}) {
     const auto result = mpf("new crate " + name);
@@ -201,13 +208,21 @@ TEST_F(RunCheckTest, AFileWithOtherErrorsIsCheckedAsWell) {
   EXPECT_THAT(errors, HasSubstr("4:14: queue-size: 0 is out of range"));
 }
 
+TEST_F(RunCheckTest, TheProgramOfATableWithOtherErrorsIsCheckedAsWell) {
+  const auto errors =
+      errorsOf("[[program]]\nname = \"a\"\ncommand = \"./absent\"\nserver = \"b\"\n");
+
+  EXPECT_THAT(errors, HasSubstr("3:11: there is no program \"./absent\""));
+  EXPECT_THAT(errors, HasSubstr("4:1: [[program]]: unknown key \"server\""));
+}
+
 TEST_F(RunCheckTest, EachErrorBeginsWithTheCommand) {
   static_cast<void>(files_.write("lab.toml", "colour = 1\ncarriers = {ipac = \"modle\"}\n"));
 
   EXPECT_THAT(mpf("run --check lab.toml").output,
               testing::MatchesRegex("mpf run: lab.toml:1:1: unknown key .*\n"
-                                    "mpf run: .*lab.toml: the crate starts nothing.*\n"
-                                    "mpf run: lab.toml:2:.*unknown carrier kind .*\n  model .*"));
+                                    "mpf run: lab.toml:2:.*unknown carrier kind .*\n  model .*\n"
+                                    "mpf run: .*lab.toml: the crate starts nothing.*\n"));
   EXPECT_THAT(mpf("run absent.toml").output, StartsWith("mpf run: absent.toml: cannot be read"));
   EXPECT_THAT(mpf("stop").output, StartsWith("mpf stop: no crate is running"));
   EXPECT_THAT(mpf("run --help").output, HasSubstr("2 usage error, or errors in the crate file"));

@@ -145,13 +145,13 @@ TEST_F(ReadCrateTest, AProcessIsNamedForItsModuleOrServer) {
 TEST_F(ReadCrateTest, ReportsAllErrorsAtOnce) {
   EXPECT_EQ(errorsOf("locatoin = 1\n[supervision]\nstall-limit = 5\n[[server]]\nprogram = \"dac\"\n"
                      "[[server]]\nprogram = \"int32\"\nsevrer = \"x\"\n"),
+            "lab.toml:1:1: unknown key \"locatoin\"; did you mean \"location\"?\n"
             "lab.toml:3:15: stall-limit: \"5\": write a time with its unit, such as 500ms, 2s or "
             "1min, or off\n"
             "lab.toml:5:11: unknown program \"dac\"; the programs are serial, gpib, dac128v, "
             "digital-io, ip330, ip440, int32, char8-array; a program that is not one of MPF is a "
             "[[program]] with its command\n"
-            "lab.toml:8:1: [[server]]: unknown key \"sevrer\"; did you mean \"server\"?\n"
-            "lab.toml:1:1: unknown key \"locatoin\"; did you mean \"location\"?");
+            "lab.toml:8:1: [[server]]: unknown key \"sevrer\"; did you mean \"server\"?");
 }
 
 TEST_F(ReadCrateTest, ErrorsSayWhatToWrite) {

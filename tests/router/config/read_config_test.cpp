@@ -154,10 +154,11 @@ TEST_F(ReadConfigTest, UnknownKeys) {
       {"[limits]\nqueue_size = 1\n",
        "2: [limits]: unknown key \"queue_size\"; did you mean \"queue-size\"?"},
       {"[tls]\n\npassword = \"x\"\n",
-       "3: [tls]: unknown key \"password\"; the keys are certificate, key, authorities\n"
-       "router.toml:1: [tls] has no certificate; write certificate = \"ours.pem\"\n"
+       "1: [tls] has no certificate; write certificate = \"ours.pem\"\n"
        "router.toml:1: [tls] has no key; write key = \"ours.key\"\n"
-       "router.toml:1: [tls] has no authorities; write authorities = \"authorities.pem\""},
+       "router.toml:1: [tls] has no authorities; write authorities = \"authorities.pem\"\n"
+       "router.toml:3: [tls]: unknown key \"password\"; the keys are certificate, key, "
+       "authorities"},
       {"[[remotes]]\nlocations = 1\n", "1: unknown key \"remotes\"; did you mean \"remote\"?"},
   });
 }

@@ -75,7 +75,7 @@ TEST_F(ConvertTest, RefusesACrateFile) {
 
 TEST_F(ConvertTest, RunChecksAStartupFile) {
   EXPECT_THAT(mpf("run --check --carrier model st.cmd").output,
-              HasSubstr("st.cmd: 1 processes, no error"));
+              HasSubstr("st.cmd: 1 process, no error"));
   const auto failed = mpf("run st.cmd");
   EXPECT_EQ(WEXITSTATUS(failed.status), 2);
   EXPECT_THAT(failed.output, HasSubstr("use --carrier model for models"));
