@@ -209,9 +209,10 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   attempt([&] {
     for (const auto& [backplane, watch] : watches_) watch.removeFilesOfDead();
   });
-  const auto next = service.state() == ServiceState::pausing
-                        ? fmt::format("restart {}", service.restarts())
-                        : std::string(toString(service.state()));
+  const auto willRestart =
+      service.state() == ServiceState::pausing || service.state() == ServiceState::waiting;
+  const auto next = willRestart ? fmt::format("restart {}", service.restarts())
+                                : std::string(toString(service.state()));
   logs_.note(service.plan().name,
              fmt::format("{}; {}",
                          service.endReason() == EndReason::none
