@@ -139,6 +139,7 @@ async def finish(request):
     await asyncio.sleep(0.001)
     return request.value
 """
+FINISHES_IN_LATER_LOOP = FINISHES_LATER + "server.on(mpf.Int32)(lambda request: finish(request))\n"
 NEVER_ENDS = """
 @server.on(mpf.Int32)
 def wait(request):
@@ -170,7 +171,7 @@ def line_of(process: subprocess.Popen[str]) -> str:
     return process.stdout.readline()
 
 
-@pytest.mark.parametrize("handler", [FINISHES, FINISHES_LATER])
+@pytest.mark.parametrize("handler", [FINISHES, FINISHES_LATER, FINISHES_IN_LATER_LOOP])
 def test_sigterm_lets_handlers_reply_and_ends_run(
     handler: str, program: Callable[[str], subprocess.Popen[str]]
 ) -> None:

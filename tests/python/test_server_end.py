@@ -81,6 +81,22 @@ def test_a_coroutine_that_closes_the_server_ends_first(server: mpf.Server) -> No
     server.close()
 
 
+@pytest.mark.parametrize("isFunction", [False, True])
+def test_a_thread_of_the_event_loop_may_close_the_server(
+    server: mpf.Server, isFunction: bool
+) -> None:
+    async def end(request: mpf.Int32) -> None:
+        await asyncio.to_thread(server.close)
+
+    server.on(mpf.Int32)((lambda request: end(request)) if isFunction else end)
+    with concurrent.futures.ThreadPoolExecutor() as threads:
+        running = threads.submit(server.run)
+        with pytest.raises(mpf.Refused):
+            call(mpf.Int32())
+
+        assert running.result() is None
+
+
 def test_an_async_generator_that_closes_the_server_ends(server: mpf.Server) -> None:
     @server.on(mpf.Int32)
     async def count(request: mpf.Int32) -> AsyncIterator[int]:

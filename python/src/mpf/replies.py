@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from types import AsyncGeneratorType
 from typing import Any, cast
 
 from mpf._mpf import Char8Array, Message
@@ -20,6 +22,11 @@ class NotHandled(StatusError):
     """The server has no handler for requests of this class."""
 
 
+def needs_loop(result: object) -> bool:
+    """Whether what a handler has returned runs in an event loop."""
+    return inspect.isawaitable(result) or isinstance(result, AsyncGeneratorType)
+
+
 def with_value(request: Message, value: object) -> Message:
     """The request with this value."""
     kind = cast(Callable[..., Message], type(request))
@@ -32,7 +39,7 @@ def with_value(request: Message, value: object) -> Message:
         ) from error
 
 
-def of_error(request: Message, error: Exception) -> Char8Array:
+def of_error(request: Message, error: BaseException) -> Char8Array:
     """The reply to a request whose handler has raised this exception."""
     status = _status_of(error) if isinstance(error, StatusError) else -1
     fields: dict[str, Any] = {**fields_of(request), "status": status}
@@ -51,7 +58,7 @@ def _status_of(error: StatusError) -> int:
     return error.status if isStatus else -1
 
 
-def text_of(error: Exception) -> str:
+def text_of(error: BaseException) -> str:
     """What the client is told."""
     kind = type(error).__name__
     try:  # what a program raises need not have a text

@@ -31,7 +31,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import AsyncGenerator, Callable, Generator, Iterable
+from collections.abc import AsyncGenerator, Callable, Coroutine, Generator, Iterable
 from types import AsyncGeneratorType, GeneratorType
 from typing import Any, TypeVar, cast
 
@@ -41,14 +41,15 @@ from mpf.closing import Closing
 from mpf.ending import at_sigterm, close_at_exit
 from mpf.errors import Error, QueueFull
 from mpf.failure_log import FailureLog
-from mpf.replies import NoMoreReplies, NotHandled, of_error, text_of, with_value
-from mpf.server_arguments import checked_mode, number_of_group, own_name_explained
+from mpf.replies import NoMoreReplies, NotHandled, needs_loop, of_error, text_of, with_value
+from mpf.server_arguments import check_class, checked_mode, number_of_group, own_name_explained
 from mpf.streams import Streams
 
 M = TypeVar("M", bound=Message)
 Self = TypeVar("Self")
 Handler = Callable[[M], object]
 H = TypeVar("H", bound=Callable[..., object])
+Work = Coroutine[Any, Any, None]  # on one request
 
 _log = logging.getLogger("mpf")
 _NOT_HERE = (Error, RuntimeError)  # the server is closed, or that of a parent process
@@ -99,7 +100,7 @@ class Server(Closing, _mpf.BaseServer):
             )
         self._handlers: dict[type[Message], Callable[[Any], object]] = {}
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._closing: set[asyncio.Task[Any]] = set()  # that have called close()
+        self._closing: set[asyncio.Task[Any] | None] = set()  # that have called close()
         self._streams = Streams()
         self._failures = FailureLog(self.name)
         self._thread: threading.Thread | None = None
@@ -110,13 +111,13 @@ class Server(Closing, _mpf.BaseServer):
         close_at_exit(self)
 
     def on(self, type: type[M]) -> Callable[[H], H]:
-        """Makes a function or a coroutine function the handler of requests of this class.
-        With `mpf.Message`, the function handles all requests that have no other handler; without
-        one they get an error.
+        """Makes a function, a coroutine function or another callable object the handler of requests
+        of this class. With `mpf.Message`, it handles all requests that have no other handler;
+        without one they get an error.
 
         It replaces the handler that the class had, also while the server runs.
         """
-        _check_class(type)
+        check_class(type)
 
         def register(handler: H) -> H:
             if not callable(handler):
@@ -143,8 +144,7 @@ class Server(Closing, _mpf.BaseServer):
                        for h in self._handlers.values()):
                     asyncio.run(self.serve())
                 else:
-                    with self._running():
-                        self._run()
+                    self._run()
         except KeyboardInterrupt:
             if threading.current_thread() is not threading.main_thread():
                 raise  # it is not that of Ctrl-C
@@ -184,8 +184,8 @@ class Server(Closing, _mpf.BaseServer):
                 self._interrupt()
             if self._runner is threading.current_thread():
                 self._closesAtEnd = True
-                if (task := _current_task()) is not None:
-                    self._closing.add(task)
+                with contextlib.suppress(RuntimeError):  # no event loop runs in this thread
+                    self._closing.add(asyncio.current_task())
                 return
             # After a fork, the thread that runs the server exists only in the parent.
             while self._runner is not None and self._runner.is_alive():
@@ -235,8 +235,7 @@ class Server(Closing, _mpf.BaseServer):
 
     async def serve(self) -> None:
         """Handles requests in the running event loop until interrupt() or close()."""
-        with self._running():
-            await self._serve()
+        await self._serve(self._running())
 
     @contextlib.contextmanager
     def _running(self) -> Generator[None]:
@@ -255,58 +254,79 @@ class Server(Closing, _mpf.BaseServer):
                     self._close()
                 self._state.notify_all()
 
-    async def _serve(self) -> None:
-        loop = asyncio.get_running_loop()
-        descriptor = self._fileno()
-        readable = asyncio.Event()
-        loop.add_reader(descriptor, readable.set)
-        try:
-            while not self._take_interrupt():
-                while (request := self._receive(0)) is not None:
-                    await self._start(request)
-                self._streams.look_soon()  # a client may have gone
-                await readable.wait()
-                readable.clear()
-        finally:
-            loop.remove_reader(descriptor)
-            self._streams.stop_looking()
-            if self._isFinishing and (tasks := self._tasks - self._streams.tasks()):
-                await asyncio.wait(tasks)
-            for task in self._tasks - self._closing:
-                task.cancel()
-            await asyncio.gather(*self._tasks, return_exceptions=True)
+    async def _serve(
+        self, running: contextlib.AbstractContextManager[object], begun: Work | None = None
+    ) -> None:
+        with running:
+            loop = asyncio.get_running_loop()
+            descriptor = self._fileno()
+            readable = asyncio.Event()
+            loop.add_reader(descriptor, readable.set)
+            try:
+                if begun is not None:
+                    await self._start(begun)
+                while not self._take_interrupt():
+                    while (request := self._receive(0)) is not None:
+                        await self._start(self._serve_one(request))
+                    self._streams.look_soon()  # a client may have gone
+                    await readable.wait()
+                    readable.clear()
+            finally:
+                loop.remove_reader(descriptor)
+                self._streams.stop_looking()
+                if self._isFinishing and (tasks := self._tasks - self._streams.tasks()):
+                    await asyncio.wait(tasks)
+                for task in self._tasks - self._closing:
+                    task.cancel()
+                await asyncio.gather(*self._tasks, return_exceptions=True)
 
     # ---- requests
 
     def _run(self) -> None:
+        with contextlib.ExitStack() as running:
+            running.enter_context(self._running())
+            if (begun := self._run_functions()) is not None:  # the rest runs in an event loop
+                asyncio.run(self._serve(running, begun))
+
+    def _run_functions(self) -> Work | None:
+        """Runs until an interrupt, or until a handler needs an event loop: returns its work."""
         while True:
             request = self._receive(math.inf)
             if request is not None:
-                self._handle_one(request)
+                if (result := self._handle_one(request)) is not None:
+                    return self._end_one(request, result)
             elif self._take_interrupt():
-                return
+                return None
             request = None  # frees its elements
 
-    def _handle_one(self, request: Message) -> None:
+    def _handle_one(self, request: Message) -> object:
+        """Calls the handler and replies; returns what needs an event loop instead."""
         try:
-            self._answer(request, self._handle(request))
+            result = self._handle(request)
+            if needs_loop(result):
+                return result
+            self._answer(request, result)
         except NoMoreReplies:
             pass
-        except Exception as error:
-            self._fail(request, error)
-        except BaseException:
+        except (SystemExit, KeyboardInterrupt):
             self._give_up(request)
             raise
+        except BaseException as error:  # also CancelledError: a function is not a task
+            self._fail(request, error)
+        return None
 
-    async def _start(self, request: Message) -> None:
-        task = asyncio.ensure_future(self._serve_one(request))
+    async def _start(self, work: Work) -> None:
+        task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         await asyncio.sleep(0)
 
     async def _serve_one(self, request: Message) -> None:
+        if (result := self._handle_one(request)) is not None:
+            await self._end_one(request, result)
+
+    async def _end_one(self, request: Message, result: object) -> None:
         try:
-            result = self._handle(request)
             if inspect.isawaitable(result):
                 result = await result
             if isinstance(result, AsyncGeneratorType):
@@ -333,7 +353,7 @@ class Server(Closing, _mpf.BaseServer):
             self.refuse(request)
 
     def _handle(self, request: Message) -> object:
-        handler = self._handlers.get(type(request)) or self._handlers.get(Message)
+        handler = self._handlers.get(type(request), self._handlers.get(Message))
         if handler is None:
             raise NotHandled(f"{self.name} does not handle {type(request).__name__} messages")
         return handler(request)
@@ -369,22 +389,10 @@ class Server(Closing, _mpf.BaseServer):
         with contextlib.suppress(*_NOT_HERE):
             self.refuse(request)
 
-    def _fail(self, request: Message, error: Exception) -> None:
+    def _fail(self, request: Message, error: BaseException) -> None:
         level = logging.DEBUG if isinstance(error, NotHandled) else logging.ERROR
         self._failures.write(level, "%r failed: %s", request, text_of(error), error=error)
         try:
             self._reply(request, of_error(request, error))
         except Error as failure:
             self._failures.write(logging.ERROR, "%s", failure)
-
-
-def _check_class(kind: object) -> None:
-    if not (isinstance(kind, type) and issubclass(kind, Message)):
-        raise TypeError(f"on: {kind!r} is not a class of messages, for example mpf.Int32")
-
-
-def _current_task() -> asyncio.Task[Any] | None:
-    try:
-        return asyncio.current_task()
-    except RuntimeError:  # no event loop runs in this thread
-        return None

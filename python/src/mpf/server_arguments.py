@@ -8,7 +8,13 @@ import grp
 import os
 from collections.abc import Generator
 
+from mpf._mpf import Message
 from mpf.errors import NameInUse
+
+
+def check_class(kind: object) -> None:
+    if not (isinstance(kind, type) and issubclass(kind, Message)):
+        raise TypeError(f"on: {kind!r} is not a class of messages, for example mpf.Int32")
 
 
 def checked_mode(mode: int) -> int:
