@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import AsyncIterator
 
 import pytest
@@ -30,6 +31,24 @@ async def test_an_absent_server_is_not_connected() -> None:
     async with mpf.AsyncClient("nobody", timeout=PATIENCE) as client:
         with pytest.raises(mpf.NotConnected, match="nobody"):
             await client.call(mpf.Int32(), timeout=0.01)
+
+
+async def test_nan_is_not_a_time(doubler: mpf.Server) -> None:
+    async with (
+        mpf.AsyncClient("nobody") as absent,
+        mpf.AsyncClient("doubler", timeout=PATIENCE) as client,
+    ):
+        [request] = await client.send_many([mpf.Int32(1)])
+        await request.wait()
+        for act in (
+            absent.wait_connected(math.nan),
+            absent.call(mpf.Int32(), math.nan),
+            absent.send_many([mpf.Int32()], math.nan),
+            anext(absent.subscribe(mpf.Int32(), timeout=math.nan)),
+            request.next(math.nan),
+        ):
+            with pytest.raises(ValueError, match="timeout: NaN is not a time"):
+                await act
 
 
 async def test_a_server_that_starts_later_is_found() -> None:

@@ -109,7 +109,7 @@ def test_an_absent_gpib_instrument_is_an_error(bus: None) -> None:
 def test_an_absent_server_is_an_error_whatever_the_instrument_may_take(
     act: Callable[[mpf.Serial], object],
 ) -> None:
-    for longest in (1e6, math.inf):
+    for longest in (1e6, math.inf, -math.inf):
         with mpf.Serial("nobody", timeout=longest, queue_timeout=0.01) as meter:
             with pytest.raises(mpf.NotConnected, match="nobody"):
                 act(meter)
@@ -118,6 +118,13 @@ def test_an_absent_server_is_an_error_whatever_the_instrument_may_take(
 def test_nan_is_not_a_time() -> None:
     with mpf.Serial("nobody") as meter, pytest.raises(ValueError, match="timeout: NaN"):
         meter.query("VOLT?\r", timeout=math.nan)
+
+
+def test_a_negative_time_of_an_instrument_leaves_that_of_the_queue(server: mpf.Server) -> None:
+    server.on(mpf.Char8Array)(lambda request: f"{request.timeout} ms")
+    with server.start(), mpf.Serial("tested", queue_timeout=PATIENCE) as meter:
+        for timeout in (-math.inf, -2 * PATIENCE):
+            assert meter.query("VOLT?\r", timeout=timeout) == b"1 ms"
 
 
 def test_an_operation_that_waits_for_others_expires(silent: Silent) -> None:

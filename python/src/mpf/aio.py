@@ -18,6 +18,7 @@ from mpf.aio_requests import CONNECTION, AsyncRequest, AsyncSubscription
 from mpf.client import LIMIT
 from mpf.closing import AsyncClosing
 from mpf.errors import NotConnected, QueueFull
+from mpf.seconds import checked_seconds
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -267,7 +268,8 @@ class AsyncClient(AsyncClosing, _mpf.BaseClient):
             self._timer = self._loop.call_later(left, self._drain)
 
     def _until(self, timeout: float | None) -> float:
-        return self._attach().time() + (self.timeout if timeout is None else timeout)
+        seconds = checked_seconds(self.timeout if timeout is None else timeout)
+        return self._attach().time() + seconds
 
     async def _changed(self, number: int, limit: float) -> bool:
         """Waits for an event of request `number`; returns False after `limit`."""

@@ -21,7 +21,7 @@ from mpf._mpf import Char8Array, Int32, Message, SerialConfig
 from mpf.client import Client
 from mpf.closing import Closing
 from mpf.errors import InstrumentError, InstrumentTimeout
-
+from mpf.seconds import checked_seconds
 
 _READ, _WRITE, _WRITE_READ, _POLL, _CLEAR, _TRIGGER = 1, 2, 3, 4, 5, 6
 _FLUSH, _SET_EOM, _MILLISECONDS = 0x10, 0x80, 0x100
@@ -47,9 +47,7 @@ _GPIB_STATUS = {
 
 
 def _milliseconds(seconds: float) -> int:
-    if math.isnan(seconds):
-        raise ValueError("timeout: NaN is not a time")
-    return max(1, math.ceil(min(seconds, _LONGEST) * 1000))
+    return max(1, math.ceil(min(max(seconds, 0.0), _LONGEST) * 1000))
 
 
 class Instrument(Closing):
@@ -133,7 +131,7 @@ class Instrument(Closing):
         timeout: float | None = None,
         eom: bytes = b"",
     ) -> Char8Array:
-        limit = self.timeout if timeout is None else timeout
+        limit = checked_seconds(self.timeout if timeout is None else timeout)
         request = Char8Array(
             data,
             cmd=cmd | _MILLISECONDS | self._eom_options(eom),
@@ -153,7 +151,7 @@ class Instrument(Closing):
     def _call(self, request: Message, limit: float, **options: Any) -> Message:
         # Without a connection, call() raises the reason at once.
         isConnected = self.client.wait_connected(self.queue_timeout)
-        timeout = limit + self.queue_timeout if isConnected else 0.0
+        timeout = max(limit, 0.0) + self.queue_timeout if isConnected else 0.0
         reply: Message = self.client.call(request, timeout, **options)
         return reply
 
