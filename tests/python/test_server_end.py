@@ -8,6 +8,7 @@ import concurrent.futures
 import importlib
 import sys
 import threading
+import types
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 from conftest import PATIENCE
 
 import mpf
+from mpf import ending
 
 LAYOUT = Path(__file__).parent.parent / "layout" / "v1_0"
 
@@ -203,6 +205,37 @@ def test_a_handler_that_exits_ends_run(server: mpf.Server) -> None:
         with pytest.raises(SystemExit):
             server.run()
         assert isinstance(asking.exception(), mpf.Refused)
+
+
+class Stuck:
+    """A server whose thread does not end."""
+
+    def __init__(self) -> None:
+        self._thread = self
+        self.isClosed = False
+        self.waited = 0.0
+
+    def _interrupt(self) -> None: ...
+
+    def join(self, timeout: float) -> None:
+        self.waited = timeout
+
+    def _close(self) -> None:
+        self.isClosed = True
+
+
+def test_the_end_of_a_program_waits_for_all_servers_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stuck = [Stuck() for _ in range(8)]
+    clock = types.SimpleNamespace(monotonic=lambda: 100 + sum(one.waited for one in stuck))
+    monkeypatch.setattr(ending, "_servers", stuck)
+    monkeypatch.setattr(ending, "time", clock)
+
+    ending._close_all()
+
+    assert sum(one.waited for one in stuck) == 1
+    assert all(one.isClosed for one in stuck)
 
 
 def test_start_refuses_a_server_that_runs(server: mpf.Server) -> None:

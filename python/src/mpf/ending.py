@@ -8,6 +8,7 @@ import contextlib
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING
 from weakref import WeakSet
@@ -15,7 +16,7 @@ from weakref import WeakSet
 if TYPE_CHECKING:
     from mpf.server import Server
 
-#: How long the end of the program waits for a handler in progress [s].
+#: How long the end of the program waits for all handlers in progress [s].
 _PATIENCE = 1.0
 
 _servers: WeakSet[Server] = WeakSet()
@@ -29,12 +30,13 @@ def close_at_exit(server: Server) -> None:
 @atexit.register
 def _close_all() -> None:
     servers = list(_servers)
+    end = time.monotonic() + _PATIENCE
     for server in servers:
         server._interrupt()
     for server in servers:
         thread = server._thread or server._runner
         if thread is not None and thread is not threading.current_thread():
-            thread.join(_PATIENCE)
+            thread.join(max(end - time.monotonic(), 0.0))
         server._close()
 
 
