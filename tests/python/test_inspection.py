@@ -59,6 +59,26 @@ def test_a_tap_shows_each_message(doubler: mpf.Server) -> None:
     }
 
 
+@pytest.mark.parametrize("name", ["-x", "--help"])
+def test_a_name_may_look_like_an_option(
+    name: str, backplane: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    other = f"-{backplane}"
+    with mpf.Server(name, backplane=other) as server:
+        server.on(mpf.Int32)(lambda request: request.value + 1)
+        server.start()
+        with mpf.Client(name, backplane=other, timeout=PATIENCE) as client:
+            with mpf.record(name, name, other), mpf.tap(name, other) as messages:
+                client.int32(2)
+                assert isinstance(next(messages), dict)
+        assert mpf.stats(name, other)["received"] == 1
+
+    with mpf.replay(name, name, other, speed=0):
+        with mpf.Client(name, backplane=other, timeout=PATIENCE) as client:
+            assert client.int32(2).value == 3
+
+
 def test_a_tap_that_cannot_start_says_why() -> None:
     with pytest.raises(mpf.Error, match="location"):
         next(mpf.tap("doubler", location=2**40))

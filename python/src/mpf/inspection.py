@@ -110,7 +110,7 @@ def tap(
     seconds, count: where to end; 0: close() ends it.
     """
     options = ["--json", "--count", str(count), *_backplane(backplane), *_at(location)]
-    return Tap(["tap", server, str(seconds), *options])
+    return Tap(["tap", *options, "--", server, str(seconds)])
 
 
 class Recording(Running):
@@ -139,8 +139,8 @@ def record(
     The same as `mpf tap --write`. Raises Error if the file cannot be written, or if the recording
     has not begun within 10 s.
     """
-    options = ["--write", os.fspath(file), *_backplane(backplane), *_at(location)]
-    recording = Recording(["tap", server, "0", *options])
+    options = [f"--write={os.fspath(file)}", *_backplane(backplane), *_at(location)]
+    recording = Recording(["tap", *options, "--", server, "0"])
     pattern = r"mpf tap: .*( now|; waiting for it)$"
     recording._await(recording._process.stderr, pattern, _PATIENCE)
     return recording
@@ -182,9 +182,9 @@ def replay(
     Raises Error if the recording is damaged, if it takes longer to read, or if another process
     serves this name.
     """
-    options = ["--server", server] if server else []
+    options = [f"--server={server}"] if server else []
     options += ["--speed", str(speed), "--json", *_backplane(backplane), *_at(location)]
-    ghost = Ghost(["replay", os.fspath(file), "--as-server", *options])
+    ghost = Ghost(["replay", "--as-server", *options, "--", os.fspath(file)])
     ghost._await(ghost._process.stdout, r"\{", timeout)
     return ghost
 
@@ -205,4 +205,4 @@ def _at(location: int | None) -> list[str]:
 
 
 def _backplane(name: str) -> list[str]:
-    return ["--backplane", name] if name else []
+    return [f"--backplane={name}"] if name else []
