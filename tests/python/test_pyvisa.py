@@ -194,7 +194,24 @@ def test_a_gpib_instrument(resources: pyvisa.ResourceManager, bus: None) -> None
     assert failure.value.error_code == StatusCode.error_no_listeners
 
 
-def test_a_name_of_another_kind_is_refused(resources: pyvisa.ResourceManager) -> None:
+@pytest.mark.parametrize(
+    "name",
+    [
+        "USB::1::INSTR",
+        "MPF-::x::INSTR",
+        "MPF99999999999::x::INSTR",
+        "MPF\u0663::x::INSTR",
+        "MPF::x::31::INSTR",
+        "MPF::x::99999999999999999999::INSTR",
+        "MPF::x::5::31::INSTR",
+    ],
+)
+def test_a_name_of_another_kind_is_refused(resources: pyvisa.ResourceManager, name: str) -> None:
     with pytest.raises(VisaIOError) as failure:
-        resources.open_resource("USB::1::INSTR")
+        resources.open_resource(name)
     assert failure.value.error_code == StatusCode.error_invalid_resource_name
+
+
+def test_numbers_of_a_name_may_be_the_largest_ones(resources: pyvisa.ResourceManager) -> None:
+    for name in ("MPF-2147483648::x::INSTR", "MPF2147483647::x::30::30::INSTR"):
+        resources.open_resource(name).close()

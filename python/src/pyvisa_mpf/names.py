@@ -7,10 +7,15 @@ import re
 from dataclasses import dataclass
 
 _NAME = re.compile(
-    r"MPF(?P<location>-?\d*)::(?P<server>.+?)(::(?P<primary>\d+)(::(?P<secondary>\d+))?)?"
+    r"MPF(?P<location>-?\d+)?::(?P<server>.+?)(::(?P<primary>\d+)(::(?P<secondary>\d+))?)?"
     r"(::INSTR)?",
-    re.IGNORECASE,
+    re.IGNORECASE | re.ASCII,
 )
+_ALLOWED = {
+    "location": range(-(2**31), 2**31),
+    "primary": range(31),  # addresses of IEEE 488
+    "secondary": range(31),
+}
 
 
 @dataclass(frozen=True)
@@ -34,10 +39,7 @@ def parse(text: str) -> Name | None:
     match = _NAME.fullmatch(text)
     if match is None:
         return None
-    numbers = {
-        part: int(match[part]) if match[part] else None
-        for part in ("location", "primary", "secondary")
-    }
-    return Name(
-        match["server"], numbers["location"], numbers["primary"], numbers["secondary"]
-    )
+    numbers = {part: int(match[part]) if match[part] else None for part in _ALLOWED}
+    if any(number is not None and number not in _ALLOWED[part] for part, number in numbers.items()):
+        return None
+    return Name(match["server"], **numbers)
