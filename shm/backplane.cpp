@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/number.h"
+#include "base/printable.h"
 #include "base/step.h"
 #include "shm/per_process.h"
 #include "shm/segment.h"
@@ -73,7 +74,7 @@ Watcher& Backplane::watcher() const noexcept { return state_->watcher.get(state_
 std::int32_t Backplane::defaultLocation() {
   const auto text = environmentOr("MPF_LOCATION", "0");
   if (const auto location = tryNumber<std::int32_t>(text)) return *location;
-  throw std::invalid_argument(fmt::format("MPF_LOCATION \"{}\": use an integer", text));
+  throw std::invalid_argument(fmt::format("MPF_LOCATION \"{}\": use an integer", printable(text)));
 }
 
 std::vector<std::string> Backplane::segmentNames() const {

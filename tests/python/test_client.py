@@ -354,3 +354,13 @@ def test_ctrl_c_ends_the_wait_for_a_connection() -> None:
     with mpf.Client("nobody", timeout=PATIENCE) as client, pytest.raises(KeyboardInterrupt):
         threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
         client.int32(timeout=PATIENCE)
+
+
+@pytest.mark.parametrize("kind", [mpf.Client, mpf.AsyncClient, mpf.Server])
+def test_a_location_that_is_not_utf8_is_shown_escaped(
+    kind: type[mpf.Client | mpf.AsyncClient | mpf.Server], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as variables:
+        variables.setenv("MPF_LOCATION", os.fsdecode(b"\xff"))
+        with pytest.raises(ValueError, match=r'MPF_LOCATION "\\xff": use an integer'):
+            kind("tested")

@@ -97,6 +97,10 @@ TEST_F(BackplaneTest, TakesTheDefaultLocationFromTheEnvironmentOrZero) {
   EXPECT_THAT(
       whatOf<std::invalid_argument>([] { static_cast<void>(Backplane::defaultLocation()); }),
       HasSubstr("MPF_LOCATION \"7a\""));
+  ::setenv("MPF_LOCATION", "\xff", 1);
+  EXPECT_THAT(
+      whatOf<std::invalid_argument>([] { static_cast<void>(Backplane::defaultLocation()); }),
+      HasSubstr("MPF_LOCATION \"\\xff\""));
   ::unsetenv("MPF_LOCATION");
 }
 
