@@ -47,7 +47,7 @@ class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
   std::unique_ptr<Child> startOwner(SegmentKind kind) const {
     return std::make_unique<Child>([this, kind](Child::Self& self) {
       const OwnWindow window(name(), kind, kind == SegmentKind::serverWindow ? serverName() : "",
-                             {}, [](layout::SegmentHeader&) {});
+                             {}, [](layout::SegmentHeader& header) { header.name = {"server"}; });
       self.stay();
     });
   }
