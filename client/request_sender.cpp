@@ -97,7 +97,7 @@ SendResult RequestSender::tryGrow() noexcept {
         .timeNs = deadlineNs,
     };
   };
-  const auto sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0});
+  const auto sent = channel_->trySendLocked(link, envelope, message, {link.header().queueSize, 0});
   if (sent != LinkSend::sent && sent != LinkSend::sentInPlace)
     return takeBack(*request, resultOf(sent), copy);
   requestId = id;

@@ -222,7 +222,7 @@ void ReplySender::refuse(Connection& connection, std::uint32_t generation, const
     };
   };
   const auto reserve = isFirst ? 0 : link.slotsOfFirstReplies();
-  const auto result = connection.channel->trySendLocked(envelope, message, {0, reserve});
+  const auto result = connection.channel->trySendLocked(link, envelope, message, {0, reserve});
   if (result != LinkSend::sent && result != LinkSend::sentInPlace) return noteRefused(result);
   MPF_STEP(reply_sent);
   link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);

@@ -225,13 +225,14 @@ class RingProducer {
 
   [[gnu::always_inline]] void publish(layout::Slot& first, std::uint32_t slots) noexcept {
     MPF_STEP(slot_written);
-    const auto sequence = pushed_ + 1;
-    pushed_ += slots;
+    const auto begin = pushed_;
+    const auto end = begin + slots;
+    pushed_ = end;
     countMessage();
     // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
-    first.sequence.store(sequence, std::memory_order_release);
+    first.sequence.store(begin + 1, std::memory_order_release);
     MPF_STEP(slot_published);
-    next_.store(&slot(pushed_), std::memory_order_relaxed);
+    next_.store(&slot(end), std::memory_order_relaxed);
   }
   std::uint64_t countMessage() noexcept {
     const auto messages = messages_ + 1;

@@ -34,9 +34,10 @@ class MessageLink final : public BodyLender {
   // Begins the next message, after hasMessage(): copies its envelope and counts it as taken.
   // Returns false if the envelope is invalid.
   [[nodiscard]] bool tryBegin(Envelope& envelope) noexcept {
-    envelope = link_->incoming().begin();
-    if (link_->incoming().wasIdle()) claimNextLine();
-    const bool fitsSlot = link_->incoming().hasOneSlot() && isShort(envelope.body());
+    auto& ring = link_->incoming();
+    envelope = ring.begin();
+    if (ring.wasIdle()) claimNextLine();
+    const bool fitsSlot = ring.hasOneSlot() && isShort(envelope.body());
     return (fitsSlot && hasType(envelope.body())) || isValidLong(envelope.body());
   }
   // Whether the body fits into one slot.
@@ -73,13 +74,14 @@ class MessageLink final : public BodyLender {
   // Sends `message`. The caller holds lock(). After a successful send, `message` has no body of
   // this link; the caller destroys it after it has released the lock, because the return of a body
   // of another link may need that lock. If the message was not sent, `message` is unchanged.
-  // `envelope()` returns the envelope, as for Link::trySend().
+  // `envelope()` returns the envelope, as for Link::trySend(). `link` is link(): callers have it,
+  // and the compiler would load it again.
   template <class MakeEnvelope>
-  [[gnu::always_inline]] LinkSend trySendLocked(const MakeEnvelope& envelope, Message& message,
-                                                Link::Limits limits) noexcept {
+  [[gnu::always_inline]] LinkSend trySendLocked(Link& link, const MakeEnvelope& envelope,
+                                                Message& message, Link::Limits limits) noexcept {
     if (!message.isInline() || message.body().size() > layout::kFirstSlotBodyBytes)
       return trySendLongLocked(envelope(), message, limits);
-    return link_->trySend(envelope, message.body(), limits);
+    return link.trySend(envelope, message.body(), limits);
   }
 
   // Allocates a body in the pool of this link; without data if the body is short or the pool has no

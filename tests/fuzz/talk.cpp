@@ -34,7 +34,7 @@ LinkSend sendArray(MessageLink& link, std::uint32_t requestId, std::size_t bytes
       Char8ArrayMessage::inBuffer(body.data != nullptr ? body : allocateHeapBody(size), bytes);
   Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()), .requestId = requestId};
   const BiasedLock::Guard lock(link.lock());
-  return link.trySendLocked([&] { return envelope; }, message, {});
+  return link.trySendLocked(link.link(), [&] { return envelope; }, message, {});
 }
 
 void lookAt(const Message& message) {
@@ -118,7 +118,8 @@ void Talk::publish(std::uint64_t value) {
 void Talk::sendBack(Envelope envelope, Message& message) {
   envelope.flags = layout::kSlotFirstReply;
   const BiasedLock::Guard lock(channel_->lock());
-  static_cast<void>(channel_->trySendLocked([&] { return envelope; }, message, {}));
+  static_cast<void>(
+      channel_->trySendLocked(channel_->link(), [&] { return envelope; }, message, {}));
 }
 
 }  // namespace mpf::test

@@ -48,7 +48,7 @@ class MessageLinkTest : public ShmTest {
     Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()),
                       .clientType = message.getClientType()};
     const BiasedLock::Guard guard(client_->lock());
-    return client_->trySendLocked([&] { return envelope; }, message, {});
+    return client_->trySendLocked(client_->link(), [&] { return envelope; }, message, {});
   }
   // The next message that the server receives; an empty handle if it is invalid.
   Message take() {
