@@ -1,10 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "crate/supervisor/crate_state.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include <mpf/file_descriptor.h>
+
 #include "base/output_file.h"
+#include "base/system_call.h"
 #include "base/whole_file.h"
 #include "crate/supervisor/child_process.h"
 #include "shm/shortage.h"
@@ -13,6 +22,20 @@ namespace mpf::crate {
 namespace {
 
 std::string bootId() { return readWholeFile("/proc/sys/kernel/random/boot_id"); }
+
+// Writes `text` into the blocks of a file; the rest of the last one becomes empty lines. Returns
+// false if the file has too few.
+bool tryOverwrite(const std::string& path, std::string text) {
+  const FileDescriptor file(checkCall(::open(path.c_str(), O_WRONLY | O_CLOEXEC), "open", path));
+  struct stat status{};
+  checkCall(::fstat(file.get(), &status), "look at", path);
+  constexpr blkcnt_t kBytes = 512;  // of a block in st_blocks
+  const auto room = static_cast<std::size_t>(status.st_blocks * kBytes);
+  if (text.size() > room) return false;
+  text.resize(std::max(text.size(), static_cast<std::size_t>(status.st_size)), '\n');
+  const auto written = checkCall(::pwrite(file.get(), text.data(), text.size(), 0), "write", path);
+  return static_cast<std::size_t>(written) == text.size();
+}
 
 }  // namespace
 
@@ -57,8 +80,14 @@ void CrateState::write(const std::string& path) const {
                    {"context", one.context}});
   }
   const nlohmann::json json{{"boot", bootId()}, {"crate", file}, {"processes", all}};
-  replaceFile(path, json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n",
-              0600);
+  const auto text = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n';
+  try {
+    replaceFile(path, text, 0600);
+  } catch (const std::system_error& error) {
+    const bool isFull = error.code() == std::errc::no_space_on_device ||
+                        error.code() == std::error_code(EDQUOT, std::generic_category());
+    if (!isFull || !tryOverwrite(path, text)) throw;
+  }
 }
 
 }  // namespace mpf::crate

@@ -5,7 +5,8 @@
 //   state.json  {"boot": ID, "crate": FILE, "processes": [{"name", "pid", "startTicks", ...}]}
 //
 // Threads  one.
-// Crash    the file is replaced as a whole: a reader finds the old or the new state.
+// Crash    the file is replaced as a whole: a reader finds the old or the new state. On a full disk
+//          it is overwritten, in the blocks that it has.
 // Trust    a file that cannot be read, or of another boot, counts as empty.
 #pragma once
 
@@ -22,9 +23,9 @@ struct RecordedProcess {
   pid_t pid = 0;
   std::uint64_t startTicks = 0;
   int restarts = 0;
-  std::string command;  // as shellText() writes it: a process with another one is restarted
+  std::string command;  // printable shellText(): a process with another one is restarted
   bool isStopRequested = false;
-  // As contextText() writes it, with the same effect; empty in a record of an older version.
+  // Printable contextText(), with the same effect; empty in a record of an older version.
   std::string context;
 };
 

@@ -4,15 +4,20 @@
 
 #include <mpf/clock.h>
 
+#include "base/printable.h"
 #include "crate/supervisor/child_process.h"
 #include "crate/supervisor/supervisor.h"
 
 namespace mpf::crate {
 namespace {
 
+// Texts of a record. JSON cannot hold bytes that are not UTF-8, such as those of a file's name.
+std::string commandOf(const ProcessPlan& plan) { return printable(shellText(plan)); }
+std::string contextOf(const ProcessPlan& plan) { return printable(contextText(plan)); }
+
 bool hasChanged(const RecordedProcess& process, const ProcessPlan& plan) {
-  return process.command != shellText(plan) ||
-         (!process.context.empty() && process.context != contextText(plan));
+  return process.command != commandOf(plan) ||
+         (!process.context.empty() && process.context != contextOf(plan));
 }
 
 }  // namespace
@@ -54,9 +59,9 @@ void Supervisor::record() const {
   for (const auto& member : members_) {
     const auto& service = member->service;
     state.processes.push_back({service.plan().name, service.pid(), service.startTicks(),
-                               service.restarts(), shellText(service.plan()),
+                               service.restarts(), commandOf(service.plan()),
                                service.isStopRequested() && !isShuttingDown_ && !member->isRemoved,
-                               contextText(service.plan())});
+                               contextOf(service.plan())});
   }
   state.write(folder_.file("state.json"));
 }

@@ -4,7 +4,9 @@
 
 #include <unistd.h>
 
+#include <filesystem>
 #include <gtest/gtest.h>
+#include <system_error>
 
 #include "base/whole_file.h"
 #include "crate/supervisor/child_process.h"
@@ -39,6 +41,31 @@ TEST_F(CrateStateTest, IsReadAsItWasWritten) {
   EXPECT_EQ(one.command, "mpf-x 'a b'");
   EXPECT_TRUE(one.isStopRequested);
   EXPECT_EQ(one.context, "user=''");
+}
+
+// The file that would replace the old one cannot be written.
+TEST_F(CrateStateTest, IsOverwrittenOnAFullDisk) {
+  for (const int restarts : {7, 8}) {
+    std::filesystem::create_symlink("/dev/full", path_ + ".new");
+    state_.processes[0].restarts = restarts;
+    state_.processes[0].command = restarts == 7 ? "a longer command" : "x";
+
+    state_.write(path_);
+
+    const auto read = CrateState::read(path_);
+    ASSERT_EQ(read.processes.size(), 1U);
+    EXPECT_EQ(read.processes[0].restarts, restarts);
+    EXPECT_EQ(read.processes[0].command, state_.processes[0].command);
+  }
+}
+
+TEST_F(CrateStateTest, OnAFullDiskTheOldOneStaysIfTheNewOneDoesNotFit) {
+  std::filesystem::create_symlink("/dev/full", path_ + ".new");
+  state_.processes[0].command = std::string(100'000, 'x');
+
+  EXPECT_THROW(state_.write(path_), std::system_error);
+
+  EXPECT_EQ(CrateState::read(path_).processes.at(0).command, "mpf-x 'a b'");
 }
 
 TEST_F(CrateStateTest, AProcessThatHasEndedIsNotRunning) {

@@ -214,6 +214,22 @@ TEST_F(SupervisorTest, ANewSupervisorTakesOverWhatRuns) {
   EXPECT_TRUE(isReplying("Int32"));
 }
 
+TEST_F(SupervisorTest, TakesOverACrateInAFolderWhoseNameIsNotUtf8) {
+  const auto folder = files_.file("d\xe9");
+  std::filesystem::create_directory(folder);
+  write(kServer);
+  std::filesystem::rename(files_.file("lab.toml"), folder + "/lab.toml");
+  start({MPF, "run", folder + "/lab.toml"});
+  waitForState("int32", "ready");
+  const auto before = pidOf("int32");
+
+  killSupervisor();
+  start({MPF, "run", folder + "/lab.toml"});
+  waitForState("int32", "ready");
+
+  EXPECT_EQ(pidOf("int32"), before);
+}
+
 // A router reads its file only when it starts.
 TEST_F(SupervisorTest, ATakenOverProcessWithAChangedFileIsRestarted) {
   const std::string listen = "[[listen]]\naddress = \"127.0.0.1:0\"\nsecurity = \"plain\"\n";
