@@ -18,7 +18,7 @@ namespace mpf::test {
 
 class DeadServer {
  public:
-  //   window   file name of its window
+  //   window   file name of its window, of a server at location 0
   DeadServer(const std::string& backplane, const std::string& window)
       : server_([&](Child::Self& self) { run(self, backplane, window); }) {
     ::kill(server_.pid(), SIGKILL);
@@ -31,8 +31,11 @@ class DeadServer {
 
  private:
   static void run(Child::Self& self, const std::string& backplane, const std::string& window) {
-    const OwnWindow own(backplane, layout::SegmentKind::serverWindow, window, {},
-                        [](layout::SegmentHeader&) {});
+    const OwnWindow own(
+        backplane, layout::SegmentKind::serverWindow, window, {},
+        [&](layout::SegmentHeader& header) {
+          window.substr(window.rfind('.') + 1).copy(header.name.data(), header.name.size() - 1);
+        });
     const auto child = ::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0);
     if (child < 0) ::_exit(1);
     if (child == 0) {
