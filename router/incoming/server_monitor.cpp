@@ -2,18 +2,11 @@
 #include "router/incoming/server_monitor.h"
 
 #include <algorithm>
-#include <string_view>
 
 #include "shm/link.h"
 #include "shm/segment_name.h"
 
 namespace mpf::router {
-
-namespace {
-
-constexpr std::string_view kRouterProgram = "mpf-router";
-
-}  // namespace
 
 ServerMonitor::ServerMonitor(Backplane backplane, ServerName name, std::function<void()> onChange)
     : backplane_(std::move(backplane)), name_(std::move(name)), onChange_(std::move(onChange)) {}
@@ -44,10 +37,6 @@ bool ServerMonitor::find() try {
       SegmentName::serverWindow(backplane_.name(), name_.location, name_.server),
       layout::SegmentKind::serverWindow);
   if (!window || window->isClosed() || !window->hasOwner()) return false;
-  if (segments::text(window->header().program) == kRouterProgram) {
-    problem_ = "a router of that host leads to it, to a further host";
-    return false;
-  }
   token_ = backplane_.watcher().watchPeer(window, onChange_);
   window_ = std::move(window);
   problem_.clear();

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // ServerMonitor: observes whether a server of this backplane is running, and what it offers,
-// without connecting to it. A server that a router owns is not running here: it is on a further
-// host. If routers offered such servers, two of them could announce an absent server to each other
-// for ever.
+// without connecting to it.
 //
 // Threads  that of the event loop; `onChange` is also called by the watcher's thread.
 // Trust    values that are read from a server's window are bounded before use.

@@ -8,13 +8,9 @@
 
 #include <fstream>
 #include <gtest/gtest.h>
-#include <optional>
-#include <string_view>
 
 #include <mpf/message_server.h>
 
-#include "shm/segment_name.h"
-#include "shm/window.h"
 #include "tests/support/sanitized.h"
 #include "tests/support/test_backplane.h"
 
@@ -48,28 +44,6 @@ class NoMoreThreads {
   rlimit before_{};
   pthread_attr_t threads_{};
 };
-
-TEST(ServerMonitor, DoesNotOfferAServerOfAnotherRouter) {
-  const mpf::test::TestBackplane backplane;
-  const auto name = SegmentName::serverWindow(backplane.name(), 1, "echo");
-  std::optional<OwnWindow> window;
-  const auto make = [&](const char* program) {
-    window.reset();
-    window.emplace(backplane.name(), layout::SegmentKind::serverWindow, name, Rights{},
-                   [&](layout::SegmentHeader& header) {
-                     header.program = {};
-                     std::string_view(program).copy(header.program.data(), header.program.size());
-                   });
-  };
-  ServerMonitor monitor(Backplane::attach(backplane.name()), {1, "echo"}, [] {});
-
-  make("mpf-echo");
-  EXPECT_TRUE(monitor.look());
-  make("mpf-router");
-  EXPECT_FALSE(monitor.look());
-  EXPECT_FALSE(monitor.isDoubtful());
-  EXPECT_EQ(monitor.problem(), "a router of that host leads to it, to a further host");
-}
 
 // The end of the server would not be noticed. A later look() finds the server.
 TEST(ServerMonitor, IsDoubtfulWhenTheServerCannotBeWatched) {
