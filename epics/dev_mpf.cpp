@@ -211,7 +211,7 @@ class DevMpf::Impl final : public SharedClient::Member,
     hasMessageTime_ = false;
     errlogPrintf("%s: %s\n", record_->name, error.what());
   }
-  // The server was stopped, or runs again: start() sets the alarm, or gets the value.
+  // The server was stopped, or runs again: startIfConnected() sets the alarm, or gets the value.
   void onServerStopped() {
     if (hasProcessed_ && !record_->pact) dbProcess(record_);
   }

@@ -23,8 +23,8 @@ namespace {
 
 std::string bootId() { return readWholeFile("/proc/sys/kernel/random/boot_id"); }
 
-// Writes `text` into the blocks of a file; the rest of the last one becomes empty lines. Returns
-// false if the file has too few.
+// Overwrites a file within the blocks that it has. What remains of its old text becomes empty
+// lines. Returns false if it has too few blocks.
 bool tryOverwrite(const std::string& path, std::string text) {
   const FileDescriptor file(checkCall(::open(path.c_str(), O_WRONLY | O_CLOEXEC), "open", path));
   struct stat status{};

@@ -19,10 +19,9 @@ constexpr std::size_t kMostUnsent = 4096;
 constexpr int kHighestPrimary = 30;
 constexpr std::size_t kPlusSigns = 2;
 
-// Addresses in the form "22", "22 101".
 constexpr std::string_view kUnrecognized = "Unrecognized command";
 
-// Empty if the first word is no primary address.
+// Addresses in the form "22", "22 101"; empty if the first word is no primary address.
 std::vector<GpibAddress> addressesIn(const std::vector<int>& words) {
   std::vector<GpibAddress> addresses;
   for (const int word : words) {

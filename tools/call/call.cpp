@@ -118,7 +118,7 @@ class Caller {
     const auto why = answer.why();
     if (answer.refusal() != SendResult::notConnected) return why;
     const auto snapshot = Snapshot::take(Backplane::named(arguments_.backplane).name());
-    return why + moreOfUnconnected(snapshot, arguments_.server, arguments_.location) +
+    return why + connectionHint(snapshot, arguments_.server, arguments_.location) +
            "; `mpf ls` shows all servers";
   }
 

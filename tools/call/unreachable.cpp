@@ -58,8 +58,8 @@ std::string whyUnreachable(const Snapshot& snapshot, std::string_view server,
   return text;
 }
 
-std::string moreOfUnconnected(const Snapshot& snapshot, std::string_view server,
-                              std::int32_t location) {
+std::string connectionHint(const Snapshot& snapshot, std::string_view server,
+                           std::int32_t location) {
   if (const auto* const view = findAt(snapshot, server, location))
     return isStopped(view->processState) ? fmt::format(" (its process {} is stopped)", view->pid)
                                          : "";

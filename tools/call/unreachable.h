@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // whyUnreachable(): why clients cannot reach a server on another host, as far as the routers of the
-// backplane tell. moreOfUnconnected(): what is known about a server without a connection.
+// backplane tell. connectionHint(): what is known about a server without a connection.
 //
 // Threads  any.
 #pragma once
@@ -19,7 +19,7 @@ namespace mpf::tools {
 
 // What the tools append to the client's text when it is not connected, with its punctuation: that
 // the server's process is stopped, whyUnreachable(), or the location at which the server runs.
-[[nodiscard]] std::string moreOfUnconnected(const Snapshot& snapshot, std::string_view server,
-                                            std::int32_t location);
+[[nodiscard]] std::string connectionHint(const Snapshot& snapshot, std::string_view server,
+                                         std::int32_t location);
 
 }  // namespace mpf::tools

@@ -43,8 +43,8 @@ class FailureLog:
     def write(
         self, level: int, text: str, *arguments: object, error: BaseException | None = None
     ) -> None:
-        """The traceback of `error` begins in a function of the program; without one there is
-        none."""
+        """Logs, with the traceback of `error` from the first function of the program on, if it has
+        one."""
         limiter = self._limiters[level]
         if not _log.isEnabledFor(level) or not limiter.admit(monotonic()):
             return

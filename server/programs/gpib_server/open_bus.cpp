@@ -25,6 +25,7 @@ std::unique_ptr<GpibBus> openBus(GpibStartOptions& options, const ServerLog& log
     try {
       return std::make_unique<GpibBus>(openGpibController(options.module));
     } catch (const std::invalid_argument& error) {
+      if (options.module.find(':') != std::string::npos) throw;  // it has the form of a device
       throw std::invalid_argument(
           fmt::format("{}; or the MODULE of --ti9914 MODULE,CARRIER,SITE[,VECTOR]", error.what()));
     } catch (const std::runtime_error& error) {

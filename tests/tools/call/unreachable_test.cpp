@@ -66,8 +66,8 @@ TEST_F(WhyUnreachableTest, AServerWithAWindowIsReachable) {
 
 TEST_F(WhyUnreachableTest, AppendsWhatElseIsKnown) {
   auto snapshot = Snapshot::take(name());
-  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 0), "");
-  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 7),
+  EXPECT_EQ(connectionHint(snapshot, "echo", 0), "");
+  EXPECT_EQ(connectionHint(snapshot, "echo", 7),
             ": no router of this host has a remote with location 7");
   WindowView window;
   window.name = "echo";
@@ -76,15 +76,15 @@ TEST_F(WhyUnreachableTest, AppendsWhatElseIsKnown) {
   window.processState = 'S';
   snapshot.servers.push_back(window);
 
-  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 2), "");
-  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 0), "; it runs at location 2: --location 2");
-  EXPECT_EQ(moreOfUnconnected(snapshot, "other", 0), "");
+  EXPECT_EQ(connectionHint(snapshot, "echo", 2), "");
+  EXPECT_EQ(connectionHint(snapshot, "echo", 0), "; it runs at location 2: --location 2");
+  EXPECT_EQ(connectionHint(snapshot, "other", 0), "");
 
   snapshot.servers.back().processState = 'T';
-  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 2), " (its process 77 is stopped)");
+  EXPECT_EQ(connectionHint(snapshot, "echo", 2), " (its process 77 is stopped)");
 
   snapshot.servers.back().life = Life::dead;
-  EXPECT_EQ(moreOfUnconnected(snapshot, "echo", 0), "");
+  EXPECT_EQ(connectionHint(snapshot, "echo", 0), "");
 }
 
 }  // namespace

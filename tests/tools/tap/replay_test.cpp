@@ -14,7 +14,18 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class ReplayTest : public TapTest {};
+class ReplayTest : public TapTest {
+ protected:
+  // A recording of these requests of one client to "echo", which has ended then.
+  void record(int requests) {
+    const EchoThread echo(backplane_, "echo");
+    SyncClient client(backplane_, "echo");
+    callMany(client, 0, 1);
+    const auto tool = tap({"--write", file_, "--count", std::to_string(2 * requests)});
+    callMany(client, 0, requests);
+    EXPECT_EQ(tool->end().status, 0);
+  }
+};
 
 TEST_F(ReplayTest, SendsARecordingInOrder) {
   {
@@ -74,14 +85,7 @@ TEST_F(ReplayTest, RefusesAFileThatIsNotARecording) {
 }
 
 TEST_F(ReplayTest, SendsATruncatedRecordingUpToItsEnd) {
-  {
-    const EchoThread echo(backplane_, "echo");
-    SyncClient client(backplane_, "echo");
-    callMany(client, 0, 1);
-    const auto tool = tap({"--write", file_, "--count", "4"});
-    callMany(client, 0, 2);
-    EXPECT_EQ(tool->end().status, 0);
-  }
+  record(2);
   std::filesystem::resize_file(file_, std::filesystem::file_size(file_) - 5);
   const EchoThread echo(backplane_, "echo");
 
@@ -99,14 +103,7 @@ TEST_F(ReplayTest, SendsATruncatedRecordingUpToItsEnd) {
 
 // The requests go to the server that the user names, as the one of the recording may not run here.
 TEST_F(ReplayTest, SendsToAnotherServerAndReportsWhatIsNotAnswered) {
-  {
-    const EchoThread echo(backplane_, "echo");
-    SyncClient client(backplane_, "echo");
-    callMany(client, 0, 1);
-    const auto tool = tap({"--write", file_, "--count", "4"});
-    callMany(client, 0, 2);
-    EXPECT_EQ(tool->end().status, 0);
-  }
+  record(2);
   MessageServer other(backplane_, "other", {.location = 3});
   other.on<Float64>([](Float64&) {});
   std::thread thread([&] { other.run(); });
@@ -122,14 +119,7 @@ TEST_F(ReplayTest, SendsToAnotherServerAndReportsWhatIsNotAnswered) {
 
 // The further replies of one request do not count as replies to another.
 TEST_F(ReplayTest, ARequestWithoutAReplyIsAnErrorAlsoBesideASubscription) {
-  {
-    const EchoThread echo(backplane_, "echo");
-    SyncClient client(backplane_, "echo");
-    callMany(client, 0, 1);
-    const auto tool = tap({"--write", file_, "--count", "4"});
-    callMany(client, 0, 2);
-    EXPECT_EQ(tool->end().status, 0);
-  }
+  record(2);
   MessageServer server(backplane_, "echo");
   std::vector<Int32Message> kept;
   std::atomic<int> taken{0};
@@ -179,14 +169,7 @@ TEST_F(ReplayTest, ARecordingWithoutARequestIsAnError) {
 }
 
 TEST_F(ReplayTest, CtrlCEndsItWhileTheServerDoesNotAcceptIt) {
-  {
-    const EchoThread echo(backplane_, "echo");
-    SyncClient client(backplane_, "echo");
-    callMany(client, 0, 1);
-    const auto tool = tap({"--write", file_, "--count", "2"});
-    callMany(client, 0, 1);
-    EXPECT_EQ(tool->end().status, 0);
-  }
+  record(1);
   MessageServer server(backplane_, "echo");
   Tool tool({"replay", file_, "--timeout", "100000"}, backplane_.name());
   while (!server.waitForMessage()) continue;  // it asks for a connection
@@ -200,14 +183,7 @@ TEST_F(ReplayTest, CtrlCEndsItWhileTheServerDoesNotAcceptIt) {
 }
 
 TEST_F(ReplayTest, NamesAnAbsentServer) {
-  {
-    const EchoThread echo(backplane_, "echo");
-    SyncClient client(backplane_, "echo");
-    callMany(client, 0, 1);
-    const auto tool = tap({"--write", file_, "--count", "2"});
-    callMany(client, 0, 1);
-    EXPECT_EQ(tool->end().status, 0);
-  }
+  record(1);
 
   const auto ended = run({"replay", file_, "--timeout", "0.01"});
 
