@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ServerName: names a server, at a location as clients of this host see it.
+// ServerName: names a server, at a location as clients of this host see it; and how far away it may
+// be.
 #pragma once
 
 #include <compare>
@@ -7,6 +8,11 @@
 #include <string>
 
 namespace mpf::router {
+
+// A router offers no server that it reaches over more connections between routers. Locations of
+// routers can form a cycle, on which they would otherwise announce each other's proxies of an ended
+// server for ever, each proxy one hop farther than the last.
+inline constexpr std::uint32_t kMaxHops = 8;
 
 struct ServerName {
   std::int32_t location = 0;

@@ -91,6 +91,9 @@ struct Server {
   maxMessageBytes @4 :UInt64;  # there: limit of a request or a reply
   reason @5 :Text;             # absent, refused: the reason, for people
   maxOutstanding @6 :UInt32;   # there: most unanswered requests of one client
+  hops @7 :UInt16;
+  # there: further connections between routers over which the server router reaches the server; 0:
+  # the server runs on its host
   enum State {
     absent @0;   # closes all clients of the binding; `server` follows again when the state changes
     there @1;

@@ -30,7 +30,9 @@ const char* toString(ReplyResult result) noexcept {
 
 MessageServer::MessageServer(const Backplane& backplane, const std::string& name,
                              const ServerOptions& options)
-    : core_(std::make_unique<ServerCore>(backplane, name, options)) {}
+    : MessageServer(std::make_unique<ServerCore>(backplane, name, options)) {}
+
+MessageServer::MessageServer(std::unique_ptr<ServerCore> core) noexcept : core_(std::move(core)) {}
 
 MessageServer::~MessageServer() = default;
 

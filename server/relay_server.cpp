@@ -5,6 +5,10 @@
 
 namespace mpf {
 
+RelayServer::RelayServer(const Backplane& backplane, const std::string& name,
+                         const ServerOptions& options, std::uint32_t hops)
+    : MessageServer(std::make_unique<ServerCore>(backplane, name, options, hops)) {}
+
 std::shared_ptr<const void> RelayServer::closeAll() {
   struct Pools {
     Connections::Channels channels;

@@ -14,7 +14,10 @@ namespace mpf {
 
 class RelayServer : public MessageServer {
  public:
-  using MessageServer::MessageServer;
+  //   hops  connections between routers over which it reaches the other server, which its window
+  //         shows; 1: a router of that server's host is the peer
+  RelayServer(const Backplane& backplane, const std::string& name,
+              const ServerOptions& options = {}, std::uint32_t hops = 1);
   using MessageServer::receive;
 
   // Closes all connections, as the destructor does, which then does not wait for the clients. Call

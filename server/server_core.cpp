@@ -34,7 +34,7 @@ std::string windowName(const Backplane& backplane, const std::string& name, std:
 }  // namespace
 
 ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
-                       const ServerOptions& options)
+                       const ServerOptions& options, std::uint32_t hops)
     : name_(name),
       location_(options.location),
       endpoint_(
@@ -48,6 +48,7 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
             header.queueSize = queueSize;
             header.maxMessageBytes = options.maxMessageBytes;
             header.maxPoolBytes = options.maxPoolBytes;
+            header.hops = hops;
             auto* control = reinterpret_cast<std::byte*>(&header) + layout::kWindowControlOffset;
             reinterpret_cast<layout::WindowControl*>(control)->queueSize.store(
                 queueSize, std::memory_order_relaxed);

@@ -35,7 +35,9 @@ namespace mpf {
 
 class ServerCore {
  public:
-  ServerCore(const Backplane& backplane, const std::string& name, const ServerOptions& options);
+  //   hops  connections between routers over which requests reach the server; 0: this is the server
+  ServerCore(const Backplane& backplane, const std::string& name, const ServerOptions& options,
+             std::uint32_t hops = 0);
   ~ServerCore();
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }

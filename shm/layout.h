@@ -123,12 +123,14 @@ struct SegmentHeader {
 
   // Link only: slots of the second reply ring, a power of two; 0: the first one is enough.
   std::uint32_t moreReplySlots;
+  // Server window only: connections between routers over which its owner reaches the server; 0: its
+  // owner is the server.
+  std::uint32_t hops;
 };
 static_assert(sizeof(SegmentHeader) == 320);
 static_assert(offsetof(SegmentHeader, backplane) == 88 && offsetof(SegmentHeader, name) == 128);
 static_assert(offsetof(SegmentHeader, queueSlots) == 224 &&
-              offsetof(SegmentHeader, chunkBytes) == 296 &&
-              offsetof(SegmentHeader, moreReplySlots) == 312);
+              offsetof(SegmentHeader, chunkBytes) == 296 && offsetof(SegmentHeader, hops) == 316);
 
 // Log-linear histogram of durations [ns]: 4 buckets for each power of two, from 16 ns to 2^40 ns.
 // Written by one thread; a server's `serviceNs` by all that reply.

@@ -305,6 +305,7 @@ class MessageServer {
 
  private:
   friend class RelayServer;  // internal, for routers
+  explicit MessageServer(std::unique_ptr<class ServerCore> core) noexcept;
   [[noreturn]] static void refuseEmptyHandler(std::string_view type);
   template <MessageBody T, class Argument, class Handler>
   void setTypedHandler(Handler handler) {

@@ -213,6 +213,7 @@ void LocalServers::sendThere(Binding& binding) {
   const auto queueSize = binding.queueSize = binding.monitor->queueSize();
   const auto maxBodyBytes = std::max(binding.monitor->maxMessageBytes(), kMaxHeaderBytes);
   line_.send([number = binding.number, queueSize, incarnation = binding.announced,
+              hops = binding.monitor->hops(),
               maxMessageBytes = std::min(maxBodyBytes - kMaxHeaderBytes, line_.maxMessageBytes())](
                  wire::Item::Builder item) {
     auto server = item.initServer();
@@ -222,6 +223,7 @@ void LocalServers::sendThere(Binding& binding) {
     server.setQueueSize(queueSize);
     server.setMaxOutstanding(LinkGeometry::forQueue(queueSize).maxOutstanding);
     server.setMaxMessageBytes(maxMessageBytes);
+    server.setHops(static_cast<std::uint16_t>(hops));  // less than kMaxHops
   });
 }
 

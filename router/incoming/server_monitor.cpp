@@ -2,6 +2,8 @@
 #include "router/incoming/server_monitor.h"
 
 #include <algorithm>
+#include <fmt/format.h>
+#include <stdexcept>
 
 #include "shm/link.h"
 #include "shm/segment_name.h"
@@ -37,6 +39,11 @@ bool ServerMonitor::find() try {
       SegmentName::serverWindow(backplane_.name(), name_.location, name_.server),
       layout::SegmentKind::serverWindow);
   if (!window || window->isClosed() || !window->hasOwner()) return false;
+  if (window->header().hops >= kMaxHops)
+    throw std::runtime_error(
+        fmt::format("it is {} routers away, or the locations of routers form a cycle: connect the "
+                    "hosts directly, or change the locations",
+                    window->header().hops));
   token_ = backplane_.watcher().watchPeer(window, onChange_);
   window_ = std::move(window);
   problem_.clear();

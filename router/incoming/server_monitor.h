@@ -45,6 +45,7 @@ class ServerMonitor {
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept {
     return window_->header().maxMessageBytes;
   }
+  [[nodiscard]] std::uint32_t hops() const noexcept { return window_->header().hops; }
   // Why the last look() found no server.
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
 

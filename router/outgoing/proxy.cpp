@@ -42,7 +42,8 @@ Proxy::Proxy(RouterContext& context, RemoteConnection& connection, const ServerN
       log_(connection.log()),
       retry_(context.timer, [this] { retryHeld(); }),
       server_(context.backplane, name.server,
-              optionsFor(context, name, offer, connection.line().maxMessageBytes())),
+              optionsFor(context, name, offer, connection.line().maxMessageBytes()),
+              std::min(offer.hops, kMaxHops) + 1),
       again_(context.timer, [this] { onReadable(); }) {
   logShortages(server_, log_);
   server_.onClient([this](std::uint64_t client, bool isThere) { onClient(client, isThere); });

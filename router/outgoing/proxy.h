@@ -44,6 +44,7 @@ class Proxy final : private Polled {
     std::uint64_t incarnation = 0;
     std::uint32_t queueSize = 0;
     std::uint64_t maxMessageBytes = 0;
+    std::uint32_t hops = 0;  // from the peer to the server
   };
 
   // `context` and `connection` outlive this object.

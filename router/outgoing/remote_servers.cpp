@@ -126,7 +126,7 @@ void RemoteServers::onServer(wire::Server::Reader server) {
   switch (server.getState()) {
     case wire::Server::State::THERE:
       wanted.offer = Proxy::Offer{server.getBinding(), server.getIncarnation(), queueSizeOf(server),
-                                  server.getMaxMessageBytes()};
+                                  server.getMaxMessageBytes(), server.getHops()};
       if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);  // it was for an earlier incarnation
       break;
     case wire::Server::State::REFUSED:

@@ -22,6 +22,7 @@ inline Fill server(std::uint32_t binding, wire::Server::State state,
     server.setQueueSize(10);
     server.setMaxOutstanding(20);
     server.setMaxMessageBytes(1u << 20);
+    server.setHops(3);
     server.setReason("a reason of the rogue");
   };
 }

@@ -20,7 +20,7 @@ inline nlohmann::json layoutFields() {
   nlohmann::json all;
   {
     using Struct = SegmentHeader;
-    constexpr auto kReserved = offsetof(Struct, moreReplySlots) + sizeof(Struct::moreReplySlots);
+    constexpr auto kReserved = offsetof(Struct, hops) + sizeof(Struct::hops);
     all["SegmentHeader"] = {{"bytes", kHeaderBytes},
                             {"fields",
                              {MPF_FIELD(magic),
@@ -58,6 +58,7 @@ inline nlohmann::json layoutFields() {
                               MPF_FIELD(chunkCount),
                               MPF_FIELD(bulkSide),
                               MPF_FIELD(moreReplySlots),
+                              MPF_FIELD(hops),
                               {"reserved", {kReserved, kHeaderBytes - kReserved}}}}};
   }
   {

@@ -69,7 +69,8 @@ Tree offerOf(const SegmentHeader& header) {
           {"max_message_bytes", header.maxMessageBytes},
           {"max_pool_bytes", header.maxPoolBytes},
           {"link_mode", fmt::format("{:04o}", header.linkMode)},
-          {"link_group", static_cast<std::int32_t>(header.linkGroup)}};
+          {"link_group", static_cast<std::int32_t>(header.linkGroup)},
+          {"hops", header.hops}};
 }
 
 Tree controlOf(const layout::WindowControl& control) {

@@ -4,6 +4,7 @@
 
 #include <mpf/message_server.h>
 
+#include "server/relay_server.h"
 #include "tests/router/client_items.h"
 #include "tests/router/router_parts_fixture.h"
 #include "tests/support/no_descriptors.h"
@@ -71,6 +72,22 @@ TEST_F(LocalServersTest, TellWhenAServerStartsAndEnds) {
   server_.reset();
   lookAtAll();
   EXPECT_THAT(nextItem(), AllOf(HasSubstr("binding = 1"), HasSubstr("absent")));
+}
+
+// A proxy of another router of this host: locations of routers may form a cycle.
+TEST_F(LocalServersTest, TellHowFarAServerIsAndDoNotOfferOneThatIsTooFar) {
+  std::optional<RelayServer> proxy;
+  proxy.emplace(backplane_, "echo", ServerOptions{}, router::kMaxHops - 1);
+  sendItems({bind(1)});
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("state = there"), HasSubstr("hops = 7")));
+
+  proxy.reset();
+  proxy.emplace(backplane_, "echo", ServerOptions{}, router::kMaxHops);
+  lookAtAll();
+
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("absent"), HasSubstr("it is 8 routers away")));
+  EXPECT_THAT(logged_, HasSubstr("echo at location 1 cannot be offered to 10.0.0.7:40000: it is 8 "
+                                 "routers away"));
 }
 
 TEST_F(LocalServersTest, RefuseWhatIsNotServed) {

@@ -7,6 +7,8 @@
 
 #include <mpf/message_server.h>
 
+#include "shm/segment_name.h"
+#include "shm/window.h"
 #include "tests/router/router_parts_fixture.h"
 #include "tests/router/server_items.h"
 #include "tests/support/caller.h"
@@ -117,6 +119,15 @@ TEST_F(RemoteServersTest, CarryARequestAndItsReply) {
   ASSERT_NE(fields, nullptr);
   EXPECT_EQ(fields->value, 43);
   EXPECT_THAT(caller_->open, IsEmpty());
+}
+
+TEST_F(RemoteServersTest, CountTheHopsToAServer) {
+  connectClient();
+
+  const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 1, "echo"),
+                                          layout::SegmentKind::serverWindow);
+  ASSERT_TRUE(window);
+  EXPECT_EQ(window->header().hops, 4u) << "one more than the peer has said";
 }
 
 TEST_F(RemoteServersTest, EndPendingRequestsAndDisconnectTheClientWhenTheServerIsAbsent) {

@@ -79,6 +79,7 @@ def kindsOfItems():
       maxMessageBytes=4,
       reason="",
       maxOutstanding=5,
+      hops=6,
     ),
     item("open", client=1, binding=2, incarnation=3, window=4),
     item("close", 5),

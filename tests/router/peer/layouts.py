@@ -89,6 +89,7 @@ kLayouts = {
       "maxMessageBytes": ("u64", 24),
       "reason": ("text", 0),
       "maxOutstanding": ("u32", 20),
+      "hops": ("u16", 6),
     },
   ),
   "Open": Layout(

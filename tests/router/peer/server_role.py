@@ -242,6 +242,7 @@ class Session:
         queueSize=server.queueSize,
         maxMessageBytes=server.maxMessageBytes,
         maxOutstanding=server.maxOutstanding,
+        hops=0,
       )
     )
 
