@@ -212,9 +212,12 @@ void Binding::deliver(Message&& message) try {
 void Binding::takeFurtherReplies(const Message& first, ValueRun& run) noexcept {
   const auto like = wordsOf(first, 0);
   takeRun(run, ValueRun::kMost, [&](const EnvelopeWords& words) {
-    if (words.body != like.body || words.request != like.request || !words.hasMarksOf(like))
+    if (words.body != like.body || words.request != like.request || words.timeNs != like.timeNs)
       return false;
-    if (words.sentTick() != 0) noteTimes(words.sentTick(), nullptr);
+    if (words.client == like.client) [[likely]]
+      return true;  // not timed
+    if (words.clientWith(0) != like.client) return false;
+    noteTimes(words.sentTick(), nullptr);
     return true;
   });
 }
@@ -257,7 +260,7 @@ bool Binding::tryDeliverRun(const Message& first) {
 template <class Run, class Accept>
 void Binding::takeRun(Run& run, std::size_t most, const Accept& accept) noexcept {
   const auto taken = channel().link().incoming().takeRun(
-      most - 1, accept, [&](const FirstBody& body) { run.add(body); });
+      most - 1, accept, [&](std::size_t count, const auto& body) { run.add(count, body); });
   count(control().received, taken);
 }
 

@@ -32,12 +32,9 @@ std::int64_t nsOf(Deadline takeBefore) noexcept {
   return takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1);
 }
 
-// Returns the function that Link::trySendRun() calls after each message: it publishes the number of
-// messages sent.
-auto noteSent(Link& link) noexcept {
-  return [&clientSent = link.control().clientSent](std::uint64_t messages) {
-    clientSent.store(messages, std::memory_order_relaxed);
-  };
+// Shows the number of messages sent to the tools.
+void showSent(Link& link) noexcept {
+  link.control().clientSent.store(link.outgoing().messages(), std::memory_order_relaxed);
 }
 
 std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
@@ -102,7 +99,7 @@ SendResult RequestSender::tryGrow() noexcept {
     return takeBack(*request, resultOf(sent), copy);
   requestId = id;
   isFullReported_ = false;
-  link.control().clientSent.store(link.outgoing().messages(), std::memory_order_relaxed);
+  showSent(link);
   return SendResult::sent;
 }
 
@@ -265,9 +262,10 @@ std::size_t RequestSender::sendRunLocked(const Bodies& bodies, std::int64_t dead
                               .timeNs = deadlineNs},
                              1, layout::kFirstSlotBodyBytes);
   };
-  const auto count =
-      link.trySendRun(words, bodies.first(most).all, {link.header().queueSize, 0}, noteSent(link));
-  if (count != 0) isFullReported_ = false;
+  const auto count = link.trySendRun(words, bodies.first(most).all, {link.header().queueSize, 0});
+  if (count == 0) return 0;
+  isFullReported_ = false;
+  showSent(link);
   return count;
 }
 
@@ -300,8 +298,9 @@ std::size_t RequestSender::sendRunLocked(const MessageRun& run) noexcept {
   };
   while (sent < count) {
     const auto rest = run.values(sent, count - sent);
-    const auto next = link.trySendRun(words, rest, {link.header().queueSize, 0}, noteSent(link));
+    const auto next = link.trySendRun(words, rest, {link.header().queueSize, 0});
     if (next == 0) break;
+    showSent(link);
     sent += next;
   }
   for (auto at = sent; at < count; ++at) static_cast<void>(requests_->takeBack(*added[at]));

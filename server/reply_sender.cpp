@@ -12,13 +12,10 @@
 namespace mpf {
 namespace {
 
-// Returns the function that Link::trySendRun() calls after each message: it publishes the number of
-// messages sent.
-auto noteSent(Link& link) noexcept {
-  return [&serverSent = link.control().serverSent](std::uint64_t messages) {
-    MPF_STEP(reply_sent);
-    serverSent.store(messages, std::memory_order_relaxed);
-  };
+// Shows the number of messages sent to the tools.
+void showSent(Link& link) noexcept {
+  MPF_STEP(reply_sent);
+  link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
 }
 
 }  // namespace
@@ -127,11 +124,12 @@ void ReplySender::sendFullSlotsLocked(Connection& connection, const Message& req
   for (const auto count = bodies.count(); sent.count < count;) {
     // A run may end with the move to the second ring, where more slots are reserved.
     const Link::Limits limits{0, link.slotsOfFirstReplies()};
-    const auto run = link.trySendRun(words, bodies.from(sent.count).all, limits, noteSent(link));
+    const auto run = link.trySendRun(words, bodies.from(sent.count).all, limits);
     if (run == 0) {
       sent.result = noteRefused(LinkSend::full);
       return;
     }
+    showSent(link);
     sent.count += run;
   }
 }
@@ -173,9 +171,9 @@ std::size_t ReplySender::sendRunLocked(Connection& connection, const MessageRun&
   const Link::Batch batch(link);
   while (sent < count) {
     const Link::Limits limits{0, isFirst ? 0 : link.slotsOfFirstReplies()};
-    const auto next =
-        link.trySendRun(words, run.values(sent, count - sent), limits, noteSent(link));
+    const auto next = link.trySendRun(words, run.values(sent, count - sent), limits);
     if (next == 0) break;
+    showSent(link);
     sent += next;
   }
   for (std::size_t index = 0; isFirst && index < sent; ++index) {
@@ -224,8 +222,7 @@ void ReplySender::refuse(Connection& connection, std::uint32_t generation, const
   const auto reserve = isFirst ? 0 : link.slotsOfFirstReplies();
   const auto result = connection.channel->trySendLocked(link, envelope, message, {0, reserve});
   if (result != LinkSend::sent && result != LinkSend::sentInPlace) return noteRefused(result);
-  MPF_STEP(reply_sent);
-  link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
+  showSent(link);
   if (!isFirst) return ReplyResult::sent;
   static_cast<void>(message.exchangeKeeper(nullptr));
   connection.noteFirstReply(requestId, counts_);

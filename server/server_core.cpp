@@ -292,7 +292,7 @@ bool ServerCore::tryTakeRun(Connection& connection, MessageRun& run, std::size_t
     return true;
   };
   link.incoming().takeRun(std::min(most, MessageRun::kMost), accept,
-                          [&](const FirstBody& body) { run.add(body); });
+                          [&](std::size_t count, const auto& body) { run.add(count, body); });
   if (run.size() == 0) return false;
   endpoint_.countTurns(static_cast<std::uint32_t>(run.size() - 1));
   if (!tryNoteTaken(connection, run)) {

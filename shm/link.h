@@ -164,19 +164,19 @@ class Link {
     // NOLINTNEXTLINE(bugprone-return-const-ref-from-parameter): used only during the call
     return trySend([&]() -> const Envelope& { return envelope; }, body, limits);
   }
-  // Sends messages whose bodies fill a slot each and lie one after the other. For each, calls
-  // `words(index, sentNs)`, which returns its envelope, and then `sent(messages)` with the number
-  // of all messages so far; `sentNs` is as of timeOfNext(), and 0 for all but the first. Returns
-  // how many were sent, perhaps fewer than fit; 0: the ring is full, or as many wait as may.
-  template <class MakeWords, class Sent>
-  std::size_t trySendRun(const MakeWords& words, std::span<const std::byte> bodies, Limits limits,
-                         const Sent& sent) noexcept {
+  // Sends messages whose bodies fill a slot each and lie one after the other.
+  // `words(index, sentNs)` returns the envelope of each; `sentNs` is as of timeOfNext(), and 0 for
+  // all but the first. Returns how many were sent, perhaps fewer than fit; 0: the ring is full, or
+  // as many wait as may.
+  template <class MakeWords>
+  std::size_t trySendRun(const MakeWords& words, std::span<const std::byte> bodies,
+                         Limits limits) noexcept {
     const auto wanted = bodies.size() / layout::kFirstSlotBodyBytes;
     const auto most = limits.waiting == 0 ? wanted : roomFor(wanted, limits.waiting);
     const auto firstNs = timeOfNext();
     const auto count =
         out_.pushRun([&](std::size_t index) { return words(index, index == 0 ? firstNs : 0); },
-                     bodies.data(), most, limits.reserve, sent);
+                     bodies.data(), most, limits.reserve);
     if (count != 0) afterPush(count);
     return count;
   }

@@ -96,28 +96,30 @@ class RingProducer {
   }
   // Pushes messages whose bodies fill a slot each and lie one after the other. Stops after `most`
   // messages, before fewer than `reserve` slots would be free, or at the end of the step.
-  // Returns the number of messages; 0 if fewer than 1 + `reserve` slots are free. For each, calls
-  // `words(index)`, which returns its envelope, and then `pushed(messages)`.
-  template <class MakeWords, class Pushed>
+  // Returns the number of messages; 0 if fewer than 1 + `reserve` slots are free. `words(index)`
+  // returns the envelope of each.
+  template <class MakeWords>
   [[nodiscard, gnu::always_inline]] std::size_t pushRun(const MakeWords& words,
                                                         const std::byte* bodies, std::size_t most,
-                                                        std::uint32_t reserve,
-                                                        const Pushed& pushed) noexcept {
+                                                        std::uint32_t reserve) noexcept {
     if (most == 0 || !hasFree(1 + reserve)) return 0;
     if (pushed_ >= stepEnd_) fetchLines();
     const auto count = std::min({most, freeEnd_ - reserve - pushed_, stepEnd_ - pushed_});
+    // Copies: the compiler would load the members again after each store that publishes.
+    auto* const slots = slots_;
+    const auto mask = mask_;
+    auto messages = messages_;
     auto position = pushed_;
     for (std::size_t index = 0; index != count; ++index) {
-      auto& message = slot(position);
+      auto& message = slots[position & mask];
       words(index).copyTo(message);
       detail::copyWords<layout::kFirstSlotBodyBytes>(message.body.data(), bodies);
       bodies += layout::kFirstSlotBodyBytes;
-      const auto messages = countMessage();
+      showMessages(++messages);
       MPF_STEP(slot_written);
       // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
       message.sequence.store(++position, std::memory_order_release);
       MPF_STEP(slot_published);
-      pushed(messages);
     }
     if (count == 1) offer(slot(pushed_), reserve);
     pushed_ = position;
@@ -228,17 +230,16 @@ class RingProducer {
     const auto begin = pushed_;
     const auto end = begin + slots;
     pushed_ = end;
-    countMessage();
+    showMessages(messages_ + 1);
     // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
     first.sequence.store(begin + 1, std::memory_order_release);
     MPF_STEP(slot_published);
     next_.store(&slot(end), std::memory_order_relaxed);
   }
-  std::uint64_t countMessage() noexcept {
-    const auto messages = messages_ + 1;
+  // Before the message is published.
+  void showMessages(std::uint64_t messages) noexcept {
     // PAIR(message-counted): a thread that sees the number sees what was done before.
     std::atomic_ref(messages_).store(messages, std::memory_order_release);
-    return messages;
   }
   // Sends the line of a single message towards the processor that polls for it. A message with a
   // reserve is one of a stream. Its receiver is behind, so this would only cost time.

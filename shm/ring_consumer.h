@@ -117,22 +117,30 @@ class RingConsumer {
   // Takes the next messages together, as long as each has the next sequence and accept(words) is
   // true for its envelope; at most `most`, and not beyond the end of the batch. accept() lets only
   // messages of one slot pass. Counts all of them as taken before it reads a body. Calls
-  // `take(body)` for each; returns their number.
+  // `take(count, body)`, where `body(index)` is the body of each; returns their number.
   template <class Accept, class Take>
   [[gnu::always_inline]] std::uint64_t takeRun(std::uint64_t most, const Accept& accept,
                                                const Take& take) noexcept {
     most = std::min(most, batchEnd_ - taken_);
+    // Copies: the compiler would load the members again for each message.
+    const auto* const slots = slots_;
+    const auto mask = mask_;
+    const auto begin = taken_;
+    const auto at = [=](std::uint64_t index) -> const layout::Slot& {
+      return slots[(begin + index) & mask];
+    };
     std::uint64_t count = 0;
-    while (count < most && isFilled(taken_ + count) &&
-           accept(EnvelopeWords::in(slot(taken_ + count))))
+    // PAIR(slot-filled): the message is complete.
+    while (count < most &&
+           at(count).sequence.load(std::memory_order_acquire) == begin + count + 1 &&
+           accept(EnvelopeWords::in(at(count))))
       ++count;
     if (count == 0) return 0;
     messages_ += count;
     // PAIR(message-taken): stored before we look at the bodies.
     own_.taken.store(messages_, std::memory_order_release);
     MPF_STEP(message_counted);
-    for (auto position = taken_; position < taken_ + count; ++position)
-      take(FirstBody::of(slot(position).body.data()));
+    take(count, [&](std::uint64_t index) { return FirstBody::of(at(index).body.data()); });
     end(count);
     return count;
   }

@@ -21,7 +21,7 @@ struct MpfPlaces {
   std::string serverBackplane;
   std::string clientBackplane;  // if it differs, a pair of routers joins both
   std::int32_t location = 0;
-  int queueSize = 1024;  // sets the length of the rings, too; short ones make a stream slower
+  int queueSize = 256;  // the ring of replies then fits the first-level cache
   bool inBatches = false;  // the server sends values with replyMany()
   // The client sends values with sendMany() and receives them with onValues(); the server handles
   // several requests together.

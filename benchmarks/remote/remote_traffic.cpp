@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::size_t kInt32 = 4;
 constexpr std::size_t kArray = 1u << 20;
+constexpr int kQueueSize = 1024;  // up to 1000 requests wait
 
 using PeerMaker = std::function<std::shared_ptr<Peer>()>;
 
@@ -66,7 +67,8 @@ Measurement localRow(const Place& place, const std::string& question, const std:
   row.bytes = kInt32;
   const auto backplane = place.runName + "-local";
   row.run = [=, mode = place.wait](const Stage& stage) {
-    const MpfPlaces places{backplane, backplane};
+    const MpfPlaces places{
+        .serverBackplane = backplane, .clientBackplane = backplane, .queueSize = kQueueSize};
     const std::shared_ptr<Peer> peer =
         makeMpfPeer<Float64Array>({mode, kInt32, false, backplane}, places);
     auto outcome = goThereAndBack(stage, peer, traffic, Meter::kNobody);
@@ -85,6 +87,7 @@ Measurement remoteRow(const Place& place, const std::string& question, const std
     const MpfPlaces places{.serverBackplane = routers->serverBackplane(),
                            .clientBackplane = routers->clientBackplane(),
                            .location = kRemoteLocation,
+                           .queueSize = kQueueSize,
                            .inRuns = traffic.inRuns};
     const std::shared_ptr<Peer> peer = makeMpfPeer<Array>({mode, bytes, false, {}}, places);
     return routers->run([&] { return goThereAndBack(stage, peer, traffic, routers->clientPid()); });

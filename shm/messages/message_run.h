@@ -50,6 +50,10 @@ class MessageRun {
   // before their bodies. The run must not be full.
   void add(const EnvelopeWords& words) noexcept { words_[count_++] = words; }
   void add(const FirstBody& body) noexcept { values_.add(body); }
+  template <class Body>
+  void add(std::size_t count, const Body& body) noexcept {
+    values_.add(count, body);
+  }
 
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
   [[nodiscard]] const EnvelopeWords& operator[](std::size_t index) const noexcept {

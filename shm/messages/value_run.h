@@ -38,6 +38,14 @@ class ValueRun {
 
   void clear() noexcept { count_ = 0; }
   void add(const FirstBody& body) noexcept { body.copyTo(values_[count_++].data()); }
+  // Adds `count` bodies: `body(index)` of each.
+  template <class Body>
+  [[gnu::always_inline]] void add(std::size_t count, const Body& body) noexcept {
+    auto* to = values_[count_].data();
+    for (std::size_t index = 0; index < count; ++index, to += values_[0].size())
+      body(index).copyTo(to);
+    count_ += count;
+  }
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
   [[nodiscard]] std::span<std::byte> bytes() noexcept {
     return std::as_writable_bytes(std::span(values_).first(count_));
