@@ -45,8 +45,8 @@ FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t gr
 
 FileDescriptor tryOpenFifo(const std::string& name) noexcept {
   // For reading, too: a write must not raise SIGPIPE when the owner has died.
-  FileDescriptor fifo(
-      ::open(segments::path(name).c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
+  FileDescriptor fifo(::open(segments::pathText(name.c_str()).data(),
+                             O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
   struct stat status{};
   // Any process may have created a file of another kind under this name.
   if (fifo && (::fstat(fifo.get(), &status) != 0 || !S_ISFIFO(status.st_mode))) fifo.reset();

@@ -210,10 +210,9 @@ bool Segment::tryPublish(const std::string& name) {
   throwSystemError(errno, "name a segment", segments::path(name));
 }
 
-std::uint32_t Segment::fileUser() const {
+std::uint32_t Segment::fileUser() const noexcept {
   struct stat status{};
-  checkCall(::fstat(file_.get(), &status), "read the status of", segments::path(name_));
-  return status.st_uid;
+  return ::fstat(file_.get(), &status) == 0 ? status.st_uid : ~std::uint32_t{0};
 }
 
 bool Segment::isLocked() const noexcept { return owner_lock::isHeld(file_.get()); }
@@ -250,17 +249,19 @@ namespace segments {
 
 std::string path(const std::string& name) { return fmt::format("{}/{}", kDirectory, name); }
 
+PathText pathText(const char* name) noexcept {
+  PathText text{};
+  fmt::format_to_n(text.data(), text.size() - 1, "{}/{}", kDirectory, name);
+  return text;
+}
+
 bool remove(const char* name) noexcept {
   const bool removed = ::shm_unlink(name) == 0;
   MPF_STEP(name_removed);
   return removed;
 }
 
-bool exists(const char* name) noexcept {
-  std::array<char, 512> file{};
-  fmt::format_to_n(file.data(), file.size() - 1, "{}/{}", kDirectory, name);
-  return ::access(file.data(), F_OK) == 0;
-}
+bool exists(const char* name) noexcept { return ::access(pathText(name).data(), F_OK) == 0; }
 
 void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind,
            const std::string& path) {

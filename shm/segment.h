@@ -100,8 +100,8 @@ class Segment {
   }
 
   // The next four must be called before closeFile().
-  // Number of the user that owns the file.
-  [[nodiscard]] std::uint32_t fileUser() const;
+  // Number of the user that owns the file; ~0 if the system does not tell.
+  [[nodiscard]] std::uint32_t fileUser() const noexcept;
   // Whether the owner is alive, as probeOwner() finds out, even if the file has lost its name.
   [[nodiscard]] bool hasOwner() const noexcept;
   // Whether any process holds the owner's lock.
@@ -166,6 +166,9 @@ std::vector<std::string> list(const std::string& prefix);
 
 // Path of a segment's file.
 std::string path(const std::string& name);
+// The same for functions that must not fail: a text that ends with 0, and needs no memory.
+using PathText = std::array<char, 512>;
+[[nodiscard]] PathText pathText(const char* name) noexcept;
 
 // A text of a header, unchanged, for comparisons and for other programs.
 template <std::size_t n>

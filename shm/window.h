@@ -124,7 +124,7 @@ class PeerWindow {
   // Becomes readable when the owner's process ends; empty before setProcess(), and if this process
   // cannot find it.
   [[nodiscard]] const FileDescriptor& process() const noexcept { return process_; }
-  [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }
+  [[nodiscard]] std::uint32_t user() const noexcept { return window_.fileUser(); }
   [[nodiscard]] bool isClosed() const noexcept {
     // PAIR(window-closed): also sees that the owner has closed its links.
     return control().state.load(std::memory_order_acquire) == layout::WindowState::closed;

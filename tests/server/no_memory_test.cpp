@@ -2,6 +2,7 @@
 // A server whose process has no memory: it throws std::bad_alloc, or continues without it.
 #include <signal.h>
 
+#include <algorithm>
 #include <gtest/gtest.h>
 #include <memory>
 #include <new>
@@ -99,6 +100,34 @@ TEST_F(NoMemoryTest, AServerEndsAfterTheDeathOfAClient) {
 
     static_cast<void>(backplane_.removeDead());
   }
+}
+
+// The client has a reply in the server's pool, and has not received it.
+TEST_F(NoMemoryTest, AServerEndsBesideALivingClient) {
+  auto server = std::make_unique<MessageServer>(backplane_, kName);
+  std::size_t length = 0;
+  Dispatcher dispatcher(backplane_);
+  MessageClient client(dispatcher, [&](const Message& message) {
+    length = std::max<std::size_t>(length, message.arrayLength());
+  });
+  client.bind(kName);
+  while (!client.isConnected()) {
+    server->handleOne();
+    dispatcher.runOnce(Deadline::after(1ms));
+  }
+  ASSERT_EQ(client.send(Int32Message()), SendResult::sent);
+  Message request;
+  while (!(request = server->receive())) server->waitForMessage();
+  ASSERT_EQ(server->reply(server->allocReplyMessage<Float64Array>(request, 10'000)),
+            ReplyResult::sent);
+  {
+    const LimitedMemory limited(0);
+    server.reset();
+  }
+
+  while (length == 0) dispatcher.runOnce();
+
+  EXPECT_EQ(length, 10'000u);
 }
 
 }  // namespace
