@@ -59,11 +59,14 @@ bool tryRingFifo(const FileDescriptor& fifo) noexcept {
 }
 
 void drainFifo(const FileDescriptor& fifo) noexcept {
-  std::array<char, 256> discarded;
+  constexpr int kMostReads = 256;  // 1 MiB, as long as the FIFO of an ordinary user can be
+  std::array<char, 4096> discarded;
   // A read that does not fill the buffer has emptied the FIFO. A byte that is written later makes
-  // the FIFO readable again.
-  while (::read(fifo.get(), discarded.data(), discarded.size()) ==
-         static_cast<ssize_t>(discarded.size())) {
+  // the FIFO readable again. Peers may write without end, so the number of reads is limited.
+  for (int reads = 0; reads < kMostReads; ++reads) {
+    if (::read(fifo.get(), discarded.data(), discarded.size()) <
+        static_cast<ssize_t>(discarded.size()))
+      return;
   }
 }
 

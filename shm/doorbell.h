@@ -54,6 +54,7 @@ FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t gr
 FileDescriptor tryOpenFifo(const std::string& name) noexcept;
 // Returns false if `fifo` is empty or cannot be written: nothing was rung.
 bool tryRingFifo(const FileDescriptor& fifo) noexcept;
+// Empties the FIFO, unless peers fill it as fast: then it stays readable.
 void drainFifo(const FileDescriptor& fifo) noexcept;
 
 }  // namespace mpf::doorbell

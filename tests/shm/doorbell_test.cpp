@@ -170,6 +170,15 @@ TEST_F(DoorbellTest, RingingAFullFifoDoesNotBlock) {
   EXPECT_FALSE(isReadable(own));
 }
 
+TEST_F(DoorbellTest, DrainingAFifoThatIsFilledWithoutEndDoesNotBlock) {
+  const FileDescriptor endless(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
+  ASSERT_TRUE(endless);
+
+  doorbell::drainFifo(endless);
+
+  EXPECT_TRUE(isReadable(endless));
+}
+
 TEST_F(DoorbellTest, AFifoHasTheRequestedModeForEveryUmask) {
   const auto before = ::umask(0777);
 
