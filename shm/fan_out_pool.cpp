@@ -118,11 +118,13 @@ std::shared_ptr<FanOutChunk> FanOutPool::create(std::size_t bytes, std::uint32_t
   header.chunkBytes = bytes - layout::kBulkChunksOffset;
   header.chunkCount = 1;
   const auto name = SegmentName::fanOut(backplane_, serverWindow_, number);
-  if (!segment.tryPublish(name))
+  auto chunk = std::make_shared<FanOutChunk>(std::move(segment), number);
+  // Last, because nothing may fail after the file has its name.
+  if (!chunk->segment_.tryPublish(name))
     throw SegmentError(segments::path(name) + ": a file of this name exists already");
   MPF_STEP(fan_out_named);
-  segment.closeFile();
-  return std::make_shared<FanOutChunk>(std::move(segment), number);
+  chunk->segment_.closeFile();
+  return chunk;
 }
 
 void FanOutPool::remove(std::size_t index) noexcept {

@@ -73,18 +73,19 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
   header.chunkBytes = chunkBytes;
   header.chunkCount = count;
   header.bulkSide = place_.side;
-  if (!segment.tryPublish(SegmentName::bulk(place_.backplane, place_.link, place_.side,
-                                            static_cast<std::uint32_t>(bulks_.size())))) {
-    return false;
-  }
-  segment.closeFile();
-  MPF_STEP(bulk_named);
-  bytes_ += bytes;
+  const auto name = SegmentName::bulk(place_.backplane, place_.link, place_.side,
+                                      static_cast<std::uint32_t>(bulks_.size()));
   Bulk bulk{std::move(segment),
             ChunkSize(chunkBytes),
             std::vector<ChunkState>(count, ChunkState::free),
             {}};
   for (auto index = count; index-- > 0;) bulk.free.push_back(index);
+  bulks_.reserve(bulks_.size() + 1);
+  // Last, because nothing may fail after the file has its name: no other segment could have it.
+  if (!bulk.segment.tryPublish(name)) return false;
+  MPF_STEP(bulk_named);
+  bulk.segment.closeFile();
+  bytes_ += bytes;
   bulks_.push_back(std::move(bulk));
   return true;
 } catch (const std::exception&) {
