@@ -107,11 +107,12 @@ bool isOwned(int fd, const std::string& name) {
 }
 
 // Whether the name still refers to this regular file.
-bool isNameOf(int fd, const std::string& name) {
+bool isNameOf(int fd, const std::string& name) noexcept {
   struct stat opened{};
   struct stat named{};
   if (::fstat(fd, &opened) != 0 || !S_ISREG(opened.st_mode)) return false;
-  return ::stat(segments::path(name).c_str(), &named) == 0 && opened.st_ino == named.st_ino;
+  return ::stat(segments::pathText(name.c_str()).data(), &named) == 0 &&
+         opened.st_ino == named.st_ino;
 }
 
 // Name of the reaper file for the segment that has this name now; empty if it has no reaper file.
@@ -214,6 +215,8 @@ std::uint32_t Segment::fileUser() const noexcept {
   struct stat status{};
   return ::fstat(file_.get(), &status) == 0 ? status.st_uid : ~std::uint32_t{0};
 }
+
+bool Segment::hasName() const noexcept { return isNameOf(file_.get(), name_); }
 
 bool Segment::isLocked() const noexcept { return owner_lock::isHeld(file_.get()); }
 

@@ -99,7 +99,10 @@ class Segment {
     return *reinterpret_cast<T*>(data() + offset);
   }
 
-  // The next four must be called before closeFile().
+  // The next five must be called before closeFile().
+  // Whether the file still has its name: another process may have removed it, and another file may
+  // have it now.
+  [[nodiscard]] bool hasName() const noexcept;
   // Number of the user that owns the file; ~0 if the system does not tell.
   [[nodiscard]] std::uint32_t fileUser() const noexcept;
   // Whether the owner is alive, as probeOwner() finds out, even if the file has lost its name.

@@ -172,7 +172,8 @@ OwnWindow::~OwnWindow() {
   MPF_STEP(window_closed);
   segments::remove(fifoName_);
   segments::remove(hints_.name());
-  segments::remove(window_.name());
+  // A window that has lost its name must not remove that of its successor.
+  if (!isNameless()) segments::remove(window_.name());
 }
 
 void OwnWindow::admit(const Rights& peers) {

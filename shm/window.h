@@ -57,9 +57,7 @@ class OwnWindow {
   [[nodiscard]] const ForkGuard& forkGuard() const noexcept { return forkGuard_; }
 
   // Whether another process has removed the name, so that new peers cannot find the window.
-  [[nodiscard]] bool isNameless() const {
-    return segments::probeOwner(window_.name(), header().incarnation) == segments::Owner::absent;
-  }
+  [[nodiscard]] bool isNameless() const noexcept { return !window_.hasName(); }
 
   // Lets a server write the hints and the FIFO. `peers` are the rights of the link to this server.
   // Rights are only added. If no single user or group covers all of them, every user gets them.

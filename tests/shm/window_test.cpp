@@ -59,6 +59,17 @@ TEST_F(WindowTest, CreatesAndRemovesItsHintsAndFifo) {
   EXPECT_EQ(backplane_.segmentNames().size(), 3u);
 }
 
+// For example by RemoveIPC of systemd-logind, and then its server is started once more.
+TEST_F(WindowTest, AWindowWhoseNameWasRemovedLeavesItToItsSuccessor) {
+  auto server = makeServer();
+  ASSERT_TRUE(segments::remove(serverName()));
+  const auto successor = makeServer();
+
+  server.reset();
+
+  EXPECT_TRUE(openServer());
+}
+
 TEST_F(WindowTest, IsDescribedBeforeItHasItsName) {
   std::vector<std::string> seen{"not called"};
 
