@@ -42,8 +42,18 @@ std::vector<std::string_view> split(std::string_view name) {
   }
 }
 
+// Numbers as the functions below write them: with another spelling, a second file could have the
+// incarnation of a first one.
 std::optional<std::uint64_t> tryHex(std::string_view text) {
-  return tryNumber<std::uint64_t>(text, 16);
+  const auto number = tryNumber<std::uint64_t>(text, 16);
+  const bool isOurs = text.find_first_of("ABCDEF") == std::string_view::npos &&
+                      (text.size() == 1 || !text.starts_with('0'));
+  return isOurs ? number : std::nullopt;
+}
+template <class Number>
+std::optional<Number> tryDecimal(std::string_view text) {
+  const auto number = tryNumber<Number>(text);
+  return number && fmt::to_string(*number) == text ? number : std::nullopt;
 }
 
 bool isBackplane(std::string_view name) {
@@ -138,7 +148,7 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
   parsed.kind = static_cast<NameKind>(parts[2][0]);
   switch (parsed.kind) {
     case NameKind::serverWindow:
-      if (parts.size() != 5 || !tryNumber<std::int32_t>(parts[3]) || !isEncoded(parts[4]))
+      if (parts.size() != 5 || !tryDecimal<std::int32_t>(parts[3]) || !isEncoded(parts[4]))
         return std::nullopt;
       return parsed;
     case NameKind::link: {
@@ -151,14 +161,14 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
     }
     case NameKind::fanOut: {
       const auto server = tryHex(parts[3]);
-      if (!server || parts.size() != 5 || !tryNumber<std::uint32_t>(parts[4])) return std::nullopt;
+      if (!server || parts.size() != 5 || !tryDecimal<std::uint32_t>(parts[4])) return std::nullopt;
       parsed.incarnation = *server;
       return parsed;
     }
     case NameKind::bulk: {
-      const auto side = parts.size() == 6 ? tryNumber<std::uint32_t>(parts[4]) : std::nullopt;
-      const auto segment = side && *side < 2 ? tryNumber<std::uint32_t>(parts[5]) : std::nullopt;
-      if (!segment || parts[4].size() != 1) return std::nullopt;
+      const auto side = parts.size() == 6 ? tryDecimal<std::uint32_t>(parts[4]) : std::nullopt;
+      const auto segment = side && *side < 2 ? tryDecimal<std::uint32_t>(parts[5]) : std::nullopt;
+      if (!segment) return std::nullopt;
       parsed.side = *side;
       parsed.segment = *segment;
       [[fallthrough]];

@@ -95,7 +95,7 @@ class Judge {
         others.push_back(std::move(name));
         continue;
       }
-      if (parsed->kind == NameKind::link) listedLinks_.insert(parsed->incarnation);
+      if (parsed->kind == NameKind::link) ++listedLinks_[parsed->incarnation];
       files.emplace_back(std::move(name), *std::move(parsed));
     }
     const bool isChoice = files.size() + others.size() > most_;
@@ -115,6 +115,13 @@ class Judge {
   struct DeadWindow {
     std::string name;
     std::optional<std::uint32_t> user;  // that owned its file
+  };
+
+  // The links with one incarnation that were judged. Any user may create a second one, of another
+  // server, so their pools are dead only if all of them are.
+  struct Links {
+    std::size_t count = 0;
+    Finding finding;
   };
 
   void choose(std::vector<File>& files) const {
@@ -151,7 +158,7 @@ class Judge {
   [[nodiscard]] bool isAtItsName(const std::string& name,
                                  const layout::SegmentHeader& header) const {
     return name ==
-           SegmentName::serverWindow(backplane_, header.location, segments::text(header.name));
+           SegmentName::serverWindow(backplane_, header.location, segments::rawText(header.name));
   }
 
   void hints(const std::string& name, const Parsed& parsed) {
@@ -174,9 +181,12 @@ class Judge {
   void ofWindow(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::pendingBind)
       add(name, judgeOwned(name, layout::SegmentKind::pendingBind, false));
-    if (parsed.kind == NameKind::link)
-      add(name, links_[parsed.incarnation] = judgeOwned(name, layout::SegmentKind::link,
-                                                        servers_.contains(parsed.serverWindow)));
+    if (parsed.kind != NameKind::link) return;
+    auto finding =
+        judgeOwned(name, layout::SegmentKind::link, servers_.contains(parsed.serverWindow));
+    auto& links = links_[parsed.incarnation];
+    if (links.count++ == 0 || links.finding.verdict == Verdict::dead) links.finding = finding;
+    add(name, std::move(finding));
   }
 
   // For a link or a pending bind: it is dead if the window of its client is dead.
@@ -198,10 +208,11 @@ class Judge {
   // A pool whose link exists, but was not chosen, is not judged.
   void last(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::bulk) {
-      if (const auto link = links_.find(parsed.incarnation); link != links_.end())
-        add(name, link->second);
-      else if (!listedLinks_.contains(parsed.incarnation))
+      const auto listed = listedLinks_.find(parsed.incarnation);
+      if (listed == listedLinks_.end())
         add(name, {Verdict::dead, fmt::format("its link {:x} is gone", parsed.incarnation)});
+      else if (const auto& links = links_[parsed.incarnation]; links.count == listed->second)
+        add(name, links.finding);
     } else if (parsed.kind == NameKind::fifo || parsed.kind == NameKind::fanOut) {
       add(name, ownerOf(hints_, NameKind::hints, parsed.incarnation));
     }
@@ -226,11 +237,12 @@ class Judge {
   std::string backplane_;
   std::size_t most_;
   std::set<std::uint64_t> servers_;  // incarnations of windows of this version of the layout
-  std::set<std::uint64_t> listedLinks_;  // also those that were not chosen
+  // by incarnation: the number of links, also of those that were not chosen
+  std::map<std::uint64_t, std::size_t> listedLinks_;
   std::map<std::uint64_t, Finding> clients_;  // by the incarnation of the window
   std::multimap<std::uint64_t, DeadWindow> deadWindows_;  // likewise
   std::map<std::uint64_t, Finding> hints_;
-  std::map<std::uint64_t, Finding> links_;
+  std::map<std::uint64_t, Links> links_;  // likewise
   std::vector<Judged> judged_;
 };
 

@@ -123,6 +123,13 @@ INSTANTIATE_TEST_SUITE_P(WithAWrongKey, ForeignNames,
                                          "mpf.default.c.1 ", "mpf.default.c.10000000000000000",
                                          "mpf.default.c.1.2", "mpf.default.h.", "mpf.default.f.1.2",
                                          "mpf.default.w.1."));
+// Two names with the same numbers could not be told apart.
+INSTANTIATE_TEST_SUITE_P(WithAnotherSpelling, ForeignNames,
+                         testing::Values("mpf.default.c.01", "mpf.default.c.A", "mpf.default.h.00",
+                                         "mpf.default.l.01.1", "mpf.default.l.1.aB",
+                                         "mpf.default.b.1.00.0", "mpf.default.b.1.0.01",
+                                         "mpf.default.p.1.01", "mpf.default.s.01.a",
+                                         "mpf.default.s.-0.a"));
 INSTANTIATE_TEST_SUITE_P(WithAWrongShape, ForeignNames,
                          testing::Values("mpf.default.l.1", "mpf.default.l.1.", "mpf.default.l..1",
                                          "mpf.default.l.1.2.3", "mpf.default.l.x.1",

@@ -2,6 +2,7 @@
 // The verdicts about files of dead and living processes and about unknown files, and their reasons.
 #include "shm/stale_segments.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 
 #include <filesystem>
@@ -9,6 +10,7 @@
 #include <map>
 
 #include "shm/link.h"
+#include "shm/owner_lock.h"
 #include "tests/shm/child.h"
 #include "tests/shm/shm_fixture.h"
 
@@ -105,6 +107,71 @@ TEST_F(StaleSegmentsTest, ACopyOfTheWindowOfALivingServerIsNoEvidenceAgainstIt) 
   EXPECT_EQ(all.at(keyed(NameKind::hints, incarnation)).verdict, Verdict::alive);
   EXPECT_EQ(all.at(keyed(NameKind::fifo, incarnation)).verdict, Verdict::alive);
   segments::remove(copy);
+}
+
+// A peer keeps a lock on the hints. Texts for people escape some characters of the name.
+TEST_F(StaleSegmentsTest, TheWindowOfADeadServerIsEvidenceWhateverItsName) {
+  const std::string server = "dac\xc2\xad";
+  Child child([&](Child::Self& self) {
+    const OwnWindow own(name(), SegmentKind::serverWindow, serverName(server), {},
+                        [&](layout::SegmentHeader& header) {
+                          server.copy(header.name.data(), header.name.size() - 1);
+                        });
+    self.stay();
+  });
+  const auto header =
+      segments::tryReadHeader(serverName(server), SegmentKind::serverWindow).value();
+  const auto hints = keyed(NameKind::hints, header.incarnation);
+  child.end(SIGKILL);
+  const FileDescriptor peers(::open(segments::path(hints).c_str(), O_RDWR | O_CLOEXEC));
+  ASSERT_TRUE(owner_lock::trySet(peers.get()));
+
+  EXPECT_EQ(judgementOf(hints).verdict, Verdict::dead);
+
+  EXPECT_EQ(backplane_.removeDead().size(), 3u);
+}
+
+// Any user may create files that say so, before or after the window in a listing.
+TEST_F(StaleSegmentsTest, AnotherSpellingOfTheIncarnationOfAWindowIsNoEvidenceAgainstIt) {
+  const auto client = makeClient();
+  const auto window = keyed(NameKind::clientWindow, client.header().incarnation);
+  const auto incarnation = window.substr(window.rfind('.') + 1);
+  const auto pendingBind = keyed(NameKind::pendingBind, 7);
+  leave(pendingBind, SegmentKind::pendingBind, client.header().incarnation);
+  const std::string prefix = "mpf." + name() + ".c.0";
+  leave(prefix + incarnation, SegmentKind::clientWindow, 0);
+  std::filesystem::rename("/dev/shm/" + window, "/dev/shm/" + window + "-");
+  std::filesystem::rename("/dev/shm/" + window + "-", "/dev/shm/" + window);
+  leave(prefix + '0' + incarnation, SegmentKind::clientWindow, 0);
+
+  EXPECT_EQ(judgementOf(pendingBind).verdict, Verdict::alive);
+
+  for (const auto& file : {pendingBind, prefix + incarnation, prefix + '0' + incarnation})
+    segments::remove(file);
+}
+
+// Any user may create such files.
+TEST_F(StaleSegmentsTest, ASecondLinkWithTheSameIncarnationIsNoEvidenceAgainstAPool) {
+  const auto client = makeClient();
+  const auto link = SegmentName::link(name(), 3, 7);
+  const auto pool = SegmentName::bulk(name(), 7, 0, 0);
+  leave(SegmentName::link(name(), 2, 7), SegmentKind::link, 99);
+  leave(link, SegmentKind::link, client.header().incarnation);
+  leave(SegmentName::link(name(), 4, 7), SegmentKind::link, 99);
+  leave(pool, SegmentKind::bulk, client.header().incarnation);
+
+  const auto all = judge();
+
+  EXPECT_EQ(all.at(link).verdict, Verdict::alive);
+  EXPECT_EQ(all.at(pool).verdict, Verdict::alive);
+  // Of fewer files than there are, those of one link may be missing.
+  for (int i = 0; i < 200; ++i) {
+    for (const auto& file : stale_segments::judgeSome(name(), 4))
+      EXPECT_TRUE(file.name != pool || file.verdict == Verdict::alive);
+  }
+  EXPECT_EQ(backplane_.removeDead().size(), 2u);
+  segments::remove(link);
+  segments::remove(pool);
 }
 
 TEST_F(StaleSegmentsTest, FilesWithoutAnOwnerAreDead) {
