@@ -69,7 +69,7 @@ Backplane Backplane::isolated() {
 }
 
 const std::string& Backplane::name() const noexcept { return state_->name; }
-Watcher& Backplane::watcher() const noexcept { return state_->watcher.get(state_->name); }
+Watcher& Backplane::watcher() const { return state_->watcher.get(state_->name); }
 
 std::int32_t Backplane::defaultLocation() {
   const auto text = environmentOr("MPF_LOCATION", "0");

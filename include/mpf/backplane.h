@@ -43,8 +43,10 @@ class Backplane {
   static Backplane isolated();
 
   [[nodiscard]] const std::string& name() const noexcept;
-  // Internal: the watcher that all copies share.
-  [[nodiscard]] Watcher& watcher() const noexcept;
+  // Internal: the watcher that all copies share. The child of a fork makes its own at the first
+  // call.
+  //   throws  std::system_error, std::bad_alloc: only that first call
+  [[nodiscard]] Watcher& watcher() const;
 
   // The location of servers and clients that do not set one: the environment variable MPF_LOCATION,
   // or 0 if that is not set.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Backplane: its name, its segments, and which of them are removed.
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <fstream>
@@ -229,6 +230,21 @@ TEST_F(BackplaneTest, LeavesFilesWithOtherNamesUnchanged) {
   EXPECT_THAT(backplane_.removeDead(), IsEmpty());
 
   EXPECT_EQ(::unlink(file.c_str()), 0);
+}
+
+// It needs a watcher of its own.
+TEST_F(BackplaneTest, TheChildOfAForkThatHasNoDescriptorLeftGetsAnError) {
+  Child child([&](Child::Self& self) {
+    self.ready();
+    const rlimit none{};
+    ::setrlimit(RLIMIT_NOFILE, &none);
+    EXPECT_THROW(static_cast<void>(backplane_.watcher()), std::system_error);
+    ::_exit(HasFailure() ? 1 : 0);
+  });
+
+  child.go();
+
+  EXPECT_EQ(child.end(0), 0);
 }
 
 TEST_F(BackplaneTest, ManyProcessesMayRemoveAtOnce) {
