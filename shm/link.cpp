@@ -3,7 +3,6 @@
 
 #include <unistd.h>
 
-#include <bit>
 #include <fmt/format.h>
 #include <utility>
 
@@ -149,11 +148,12 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   const auto& header = segment->header();
   checkGeometry(header, name);
   const auto& offer = own.header();
-  if (header.serverWindow != offer.incarnation || header.maxMessageBytes > offer.maxMessageBytes ||
+  if (name != SegmentName::link(backplane, offer.incarnation, header.incarnation) ||
+      header.serverWindow != offer.incarnation || header.maxMessageBytes > offer.maxMessageBytes ||
       header.maxPoolBytes > offer.maxPoolBytes ||
       segment->bytes() != linkBytes(LinkGeometry::forQueue(header.queueSize))) {
     throw SegmentError(segments::path(name) +
-                       ": server, limits or length differ from what this server offers");
+                       ": name, server, limits or length differ from what this server offers");
   }
   MPF_STEP(link_mapped);
   segment->closeFile();

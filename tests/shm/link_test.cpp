@@ -195,6 +195,7 @@ INSTANTIATE_TEST_SUITE_P(Invalid, Geometries,
                                          [](Header& header) { header.moreReplySlots = 64; },
                                          [](Header& header) { header.maxOutstanding = UINT32_MAX; },
                                          [](Header& header) { ++header.serverWindow; },
+                                         [](Header& header) { ++header.incarnation; },
                                          [](Header& header) { ++header.maxMessageBytes; },
                                          [](Header& header) { ++header.maxPoolBytes; },
                                          [](Header& header) { header.totalBytes = UINT64_MAX; }));
