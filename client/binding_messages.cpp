@@ -17,14 +17,15 @@ constexpr bool isControl(MessageType type) noexcept {
 }
 
 // A server may send a ConnectMessage only to report a full queue behind it (a router does), not as
-// a reply; and a fate only as the reply to the request that it names.
+// a reply; and a fate only as the reply to the request that it names. Both are short: a longer one
+// may be in shared memory, where the server could change it after the check.
 bool mayServerSend(const Message& message, const Request* request) noexcept {
+  if (!message.isInline()) return false;
   if (message.getType() == MessageType::connect) {
     const auto* connect = message.tryAs<Connect>();
     return connect != nullptr && request == nullptr &&
            connect->status == ConnectStatus::connectQueueFull;
   }
-  if (message.getType() != MessageType::requestFate) return true;
   const auto* fate = message.tryAs<RequestFate>();
   return fate != nullptr && request != nullptr &&
          fate->requestId == request->id.load(std::memory_order_relaxed);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A server that sends messages that only MPF may send: its client ends the connection.
 #include <array>
+#include <cstring>
 
 #include "tests/client/client_fixture.h"
 
@@ -55,6 +56,25 @@ TEST_F(ProtocolErrorTest, AFateOfAnotherRequestEndsNoRequest) {
   });
 
   expectToBeLeft();
+}
+
+// A server could change a long body, which is in shared memory, after the client has checked it.
+TEST_F(ProtocolErrorTest, AFateInSharedMemoryEndsNoRequest) {
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) {
+    const RequestFate fate{.fate = Fate::refused, .requestId = request.route().requestId};
+    std::array<std::byte, 1000> body{};
+    std::memcpy(body.data(), &fate, sizeof fate);
+    auto lie = Message::copyOf(MessageType::requestFate, body);
+    lie.setRoute(request.route());
+    static_cast<void>(server.reply(std::move(lie)));
+  });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message({.value = 1})), SendResult::sent);
+
+  EXPECT_EQ(fateOf(next()), Fate::outcomeUnknown);
+
+  EXPECT_EQ(client_.notConnectedBecause(), "the server sent invalid data");
 }
 
 TEST_F(ProtocolErrorTest, AFateAfterTheReplyEndsNothing) {
