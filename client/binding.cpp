@@ -25,7 +25,7 @@ Message fateMessage(Fate fate, std::uint32_t requestId, std::int32_t clientType,
 
 // What to do about an error, to be appended to its text: about a server that does not admit this
 // user.
-std::string remedyFor(const std::exception& error) {
+std::string_view remedyFor(const std::exception& error) noexcept {
   const auto* const failed = dynamic_cast<const std::system_error*>(&error);
   if (failed == nullptr || failed->code().value() != EACCES) return {};
   return "; start the server with --mode 0660 --group GROUP, or this program as its user";
@@ -76,7 +76,7 @@ void Binding::tryConnect() try {
 } catch (const std::exception& error) {
   // No memory, no permission, a window of another version: report the reason and try again later.
   lacksResources_ = shortageOf(error) != layout::Shortage::none;
-  connector_.setReason(error.what() + remedyFor(error));
+  connector_.setReason(error.what(), remedyFor(error));
   connector_.retryLater();
 }
 

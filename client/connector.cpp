@@ -61,10 +61,11 @@ std::string Connector::notConnectedBecause() const {
   return reason_;
 }
 
-void Connector::setReason(std::string_view reason) noexcept {
+void Connector::setReason(std::string_view reason, std::string_view remedy) noexcept {
   const std::lock_guard lock(mutex_);
   try {
     reason_ = reason;
+    reason_ += remedy;
   } catch (const std::bad_alloc&) {
     reason_ = "no memory";  // short enough to need none
   }

@@ -55,7 +55,8 @@ class Connector {
   void cancelPendingBind();
   void retryLater() noexcept;
 
-  void setReason(std::string_view reason) noexcept;
+  //   remedy   appended: what to do about it
+  void setReason(std::string_view reason, std::string_view remedy = {}) noexcept;
   void notifyConnected();
   // Of the present or the last link.
   [[nodiscard]] std::uint32_t index() const noexcept { return index_; }

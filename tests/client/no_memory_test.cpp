@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Clients of a process without memory: nothing hangs, ends the process, is lost or stays in
 // /dev/shm.
+#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <mpf/message_server.h>
 
 #include "client/untaken_requests.h"
+#include "shm/segment.h"
 #include "shm/segment_name.h"
 #include "shm/watcher.h"
 #include "tests/client/binding_parts_fixture.h"
@@ -159,6 +161,20 @@ class BindingWithoutMemoryTest : public BindingPartsTest {
  protected:
   void TearDown() override { owner_->leave(); }
 };
+
+TEST_F(BindingWithoutMemoryTest, TriesAgainAfterAFailureWhoseReasonNeedsMemory) {
+  const auto window = SegmentName::serverWindow(backplane_.name(), 0, "dac");
+  std::ofstream{segments::path(window)};  // an empty file, which is no window
+  owner_->setServer("dac", 0);
+  for (int allocations = 0; allocations < kMost; ++allocations) {
+    const LimitedMemory limit(allocations);
+
+    EXPECT_NO_THROW(owner_->tryConnect());
+  }
+
+  EXPECT_NE(owner_->dueNs(), INT64_MAX);
+  segments::remove(window);
+}
 
 TEST_F(BindingWithoutMemoryTest, DisconnectsWithoutMemory) {
   MessageServer server(backplane_, "dac");
