@@ -122,22 +122,31 @@ void onFault(int signal, siginfo_t* fault, void* context) {
   if (!tryRepair(*fault)) passOn(signal, fault, context);
 }
 
+int openNothing() noexcept { return ::open("/dev/null", O_RDWR | O_CLOEXEC); }
+
 // Runs in the child of a fork. Replaces the child's copies of the parent's mappings by private
-// memory, and gives up its copies of the parent's locks.
+// memory, and gives up its copies of the parent's locks: their descriptors, whose numbers still
+// have owners, refer to nothing afterwards.
 void leaveToParent() noexcept {
-  const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  const int spare = openNothing();
+  int nothing = spare;
   // PAIR(guard-block): also sees the ranges of the block, and the older blocks.
   for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr;
        block = block->next) {
     for (auto& range : block->ranges) {
       if (range.begin.load(std::memory_order_relaxed) == 0) continue;
-      if (const int file = range.file.exchange(-1, std::memory_order_relaxed); file >= 0)
+      const int file = range.file.exchange(-1, std::memory_order_relaxed);
+      if (file >= 0 && nothing >= 0) {
         ::dup3(nothing, file, O_CLOEXEC);
+      } else if (file >= 0) {  // no descriptor is free: the next one gets the number of this one
+        ::close(file);
+        nothing = openNothing();
+      }
       range.inode.store(0, std::memory_order_relaxed);
       tryReplace(range);
     }
   }
-  ::close(nothing);
+  ::close(spare);
 }
 
 void watchForks() {
