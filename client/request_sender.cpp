@@ -325,11 +325,11 @@ bool RequestSender::tryKeep(Request& request) noexcept {
   return true;
 }
 
-SendResult RequestSender::trySendUntaken() {
-  auto message = untaken_.front().message->duplicate();
+SendResult RequestSender::trySendUntaken() noexcept {
   auto& next = untaken_.front();
-  auto id = next.id;
-  return sendOutOfLine(message, next.deadlineNs, id, &next.message, Turn::firstUntaken);
+  const auto message = tryCopy(*next.message);
+  if (!message) return SendResult::noMemory;
+  return sendOutOfLine(*message, next.deadlineNs, next.id, &next.message, Turn::firstUntaken);
 }
 
 // Counts each refusal, and reports a series of them once, in its place among the other messages.

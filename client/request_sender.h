@@ -70,7 +70,7 @@ class RequestSender {
   // trySendUntaken() sends it. Returns false when it has none, or there is no memory.
   [[nodiscard]] bool tryKeep(Request& request) noexcept;
   // Sends the first request that was kept; it is kept until the result is `sent`.
-  [[nodiscard]] SendResult trySendUntaken();
+  [[nodiscard]] SendResult trySendUntaken() noexcept;
   [[nodiscard]] const UntakenRequests& untaken() const noexcept { return untaken_; }
   template <class Predicate>
   std::optional<UntakenRequest> takeUntaken(Predicate&& isWanted) {

@@ -1,9 +1,33 @@
 // SPDX-License-Identifier: MIT
 // Retry::neverTaken: requests that no server has received go to the next server.
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <fstream>
+
 #include "tests/client/client_fixture.h"
+#include "tests/support/sanitized.h"
 
 namespace mpf::test {
 namespace {
+
+// Limits the memory that this process may still map.
+class LittleMemory {
+ public:
+  explicit LittleMemory(std::size_t bytes) {
+    ::getrlimit(RLIMIT_AS, &before_);
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const rlimit limit{pages * static_cast<std::size_t>(::getpagesize()) + bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_AS, &limit);
+  }
+  ~LittleMemory() { ::setrlimit(RLIMIT_AS, &before_); }
+  LittleMemory(const LittleMemory&) = delete;
+  LittleMemory& operator=(const LittleMemory&) = delete;
+
+ private:
+  rlimit before_{};
+};
 
 class RetryTest : public ClientTest {
  protected:
@@ -164,6 +188,28 @@ TEST_F(RetryTest, RequestsSurviveSeveralServersThatTakeNothing) {
 
   for (int value = 1; value <= 3; ++value) EXPECT_EQ(next().tryAs<Int32>()->value, value);
   EXPECT_THAT(handled_, testing::ElementsAre(1, 2, 3));
+}
+
+// Sending a request again needs memory for a copy.
+TEST_F(RetryTest, ARequestIsRepeatedWhenThereIsMemoryForIt) {
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer reserves the address space";
+  constexpr std::size_t kBytes = 48 << 20;
+  startServer().on<Char8Array>([](Char8ArrayMessage&) {});
+  bind();
+  serverRuns_ = false;
+  ASSERT_EQ(client_.send(client_.alloc<Char8Array>(kBytes), Deadline::never(), nullptr,
+                         Retry::neverTaken),
+            SendResult::sent);
+  stopServer();
+  startServer().on<Char8Array>([](Char8ArrayMessage&) {});
+  {
+    const LittleMemory little(kBytes / 2);
+    serverRuns_ = true;
+    runUntil([this] { return client_.isConnected(); });
+    for (int i = 0; i < 3; ++i) dispatcher_.runOnce(Deadline::after(5ms));
+  }
+
+  EXPECT_EQ(next().arrayLength(), kBytes);
 }
 
 // What the relay of a router reports about the server behind it.
