@@ -333,6 +333,34 @@ TEST_F(SniffTest, AListenerThatIsKilledOrDisconnectsIsRemoved) {
   EXPECT_TRUE(port_.taps().isEmpty());
 }
 
+TEST_F(SniffTest, ManyRequestsOfAClientDoNotDelayListeners) {
+  constexpr std::size_t kRequests = 50;
+  std::vector<std::int64_t> answersNs;
+  Dispatcher dispatcher(backplane_);
+  MessageClient busy(dispatcher, [&](const Message& message) {
+    if (message.tryAs<Int32>() != nullptr) answersNs.push_back(message.getTimeStampNs());
+  });
+  // The server calls it for the first listener: a byte is there, and many requests wait behind it.
+  const auto source = [&](const std::function<void(std::span<const SniffBytes>)>& show) {
+    for (std::size_t i = 0; i < kRequests; ++i)
+      EXPECT_EQ(busy.send(Int32Message({.cmd = 77})), SendResult::sent);
+    show(std::vector<SniffBytes>(1));
+    return std::make_shared<int>();
+  };
+  SniffServer server(backplane_, "line", {.stampsReplies = true}, source, log_, kAtOnce);
+  server.start([] { FAIL() << "the sniff server failed"; });
+  busy.bind("line.sniff");
+  while (!busy.isConnected()) dispatcher.runOnce();
+  SyncClient listener(backplane_, "line.sniff");
+
+  ASSERT_TRUE(listener.call(Int32Message({.cmd = cmdSniffStart}), 60s));
+  const auto bytes = listener.receive(60s);
+
+  while (answersNs.size() < kRequests) dispatcher.runOnce();
+  EXPECT_NE(bytes.getTimeStampNs(), 0);
+  EXPECT_LT(bytes.getTimeStampNs(), answersNs.back());
+}
+
 TEST_F(SniffTest, TheServerMayEndDuringListeningOnABusyLine) {
   startWithListening(kAtOnce);
   Listener listener(backplane_);
