@@ -265,12 +265,16 @@ void Binding::expireUntaken(std::int64_t nowNs) {
   }
 }
 
-// Sends the requests that no server has taken, as far as the present server has room for them.
+// Sends the requests that no server has taken, as far as the present server has room for them. Ends
+// those for which it never will have room.
 void Binding::sendUntaken() {
   while (!sender_.untaken().isEmpty()) {
     const auto result = sender_.trySendUntaken();
     if (result == SendResult::sent) continue;
-    if (result != SendResult::tooLarge) return timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
+    const auto bytes = sender_.untaken().all().front().message->body().size();
+    // Not connected: a callback has run the dispatcher.
+    if (result == SendResult::notConnected || channel().link().maySend(bytes))
+      return timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
     const auto isFirst = [](const UntakenRequest&) { return true; };
     deliverFate(*sender_.takeUntaken(isFirst), Fate::neverTaken);
   }

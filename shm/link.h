@@ -226,6 +226,11 @@ class Link {
 
   // Allocates a chunk for a body; nullopt if there is no memory for it.
   std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept { return pool_.tryAlloc(bytes); }
+  // Whether the limits of the link permit to send a body of this size, once there is room for it.
+  [[nodiscard]] bool maySend(std::size_t bytes) const noexcept {
+    return bytes <= maxMessageBytes_ &&
+           (bytes <= layout::kInlineBodyBytes || pool_.isWithinLimit(bytes));
+  }
   // Frees one of our chunks or returns a borrowed one; `data` points to the start of the chunk.
   void release(const std::byte* data) noexcept;
 

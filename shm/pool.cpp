@@ -17,7 +17,7 @@ constexpr std::size_t kMaxChunkBytes = UINT32_MAX;  // the largest value of Slot
 
 // A power of two for the elements, plus room for the header of a message: 1 MiB of data then does
 // not need a chunk of 2 MiB.
-std::size_t chunkBytesFor(std::size_t bytes) {
+std::size_t chunkBytesFor(std::size_t bytes) noexcept {
   constexpr std::size_t kHeaderRoom = 128;
   const auto power = std::bit_ceil(std::max<std::size_t>(bytes, 512 + kHeaderRoom) - kHeaderRoom);
   return power + kHeaderRoom;
@@ -58,6 +58,10 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
     if (!addBulk(chunkBytes)) break;
   }
   return std::nullopt;
+}
+
+bool PoolOwner::isWithinLimit(std::size_t bytes) const noexcept {
+  return bytes <= kMaxChunkBytes && layout::kBulkChunksOffset + chunkBytesFor(bytes) <= maxBytes_;
 }
 
 bool PoolOwner::addBulk(std::size_t chunkBytes) try {

@@ -94,6 +94,8 @@ class PoolOwner {
   // Returns nullopt if the limit of the link is reached, /dev/shm is full, or the peer holds too
   // many chunks.
   std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept;
+  // Whether the limit of the link permits a chunk of this size.
+  [[nodiscard]] bool isWithinLimit(std::size_t bytes) const noexcept;
   // Gives the chunk to the peer, until the peer returns it.
   void lend(ChunkPlace place) noexcept {
     bulks_[place.segment].states[place.chunk] = ChunkState::lent;

@@ -162,19 +162,24 @@ TEST_F(RetryTest, NewRequestsAreRefusedUntilAllHaveBeenRepeated) {
 }
 
 TEST_F(RetryTest, ARequestThatIsTooLargeForTheNextServerEnds) {
-  startServer().on<Char8Array>([](Char8ArrayMessage&&) {});
-  bind();
-  serverRuns_ = false;
-  ASSERT_EQ(
-      client_.send(client_.alloc<Char8Array>(5000), Deadline::never(), nullptr, Retry::neverTaken),
-      SendResult::sent);
-  send(1);
-  stopServer();
-  connectAgain({.maxMessageBytes = 1000});
-  serverRuns_ = true;
+  for (const ServerOptions& smaller :
+       {ServerOptions{.maxMessageBytes = 1000}, ServerOptions{.maxPoolBytes = 5000}}) {
+    startServer().on<Char8Array>([](Char8ArrayMessage&&) {});
+    if (id_ == 0) bind();
+    runUntil([this] { return client_.isConnected(); });
+    serverRuns_ = false;
+    ASSERT_EQ(client_.send(client_.alloc<Char8Array>(5000), Deadline::never(), nullptr,
+                           Retry::neverTaken),
+              SendResult::sent);
+    send(1);
+    stopServer();
+    connectAgain(smaller);
+    serverRuns_ = true;
 
-  EXPECT_EQ(fateOf(next()), Fate::neverTaken);
-  EXPECT_EQ(next().tryAs<Int32>()->value, 1);
+    EXPECT_EQ(fateOf(next()), Fate::neverTaken);
+    EXPECT_EQ(next().tryAs<Int32>()->value, 1);
+    stopServer();
+  }
 }
 
 TEST_F(RetryTest, RequestsSurviveSeveralServersThatTakeNothing) {
