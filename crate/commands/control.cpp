@@ -51,7 +51,7 @@ bool isReady(const json& process) {
   constexpr double kLookS = 1;
   return process.at("state") == "ready" &&
          (process.at("notifies") == true || !process.at("servers").empty() ||
-          process.at("upS") >= kLookS);
+          process.at("up_s") >= kLookS);
 }
 
 // What a process that does not run printed last, with ": " in front; empty: nothing since its

@@ -48,18 +48,18 @@ void addUse(json& process) {
   const auto pid = process.value("pid", 0);
   const auto stat = ProcessStat::tryRead(pid).value_or(ProcessStat());
   const auto ticks = stat.number(ProcessStat::kUserTicks) + stat.number(ProcessStat::kSystemTicks);
-  process["cpuS"] = static_cast<double>(ticks) / static_cast<double>(::sysconf(_SC_CLK_TCK));
+  process["cpu_s"] = static_cast<double>(ticks) / static_cast<double>(::sysconf(_SC_CLK_TCK));
   std::ifstream memory(fmt::format("/proc/{}/statm", pid));
   std::uint64_t size = 0, resident = 0;
   memory >> size >> resident;
-  process["memoryBytes"] = resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  process["memory_bytes"] = resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
 // What the supervisor calls ready may be stalled or busy.
 std::string stateOf(const json& process) {
   const std::string state = process.at("state");
   if (state != "ready") return state;
-  if (process.value("isStalled", false)) return "stalled";
+  if (process.value("is_stalled", false)) return "stalled";
   return process.contains("handling") ? "busy" : state;
 }
 
@@ -74,7 +74,7 @@ std::string workOf(const json& process) {
                      fmt::format("{}, server {}, with {} cmd={} for {}",
                                  printableOf(process, "name"), printableOf(work, "server"),
                                  printableOf(work, "type"), work.at("cmd").get<std::int32_t>(),
-                                 durationText(work.at("forS").get<double>() * 1e9)),
+                                 durationText(work.at("for_s").get<double>() * 1e9)),
                      4);
 }
 
@@ -90,9 +90,9 @@ void printCrate(const json& crate) {
     table.add(
         {printableOf(process, "name"), printableOf(process, "state"),
          isRunning ? fmt::to_string(pid) : "-", fmt::to_string(process.at("restarts").get<int>()),
-         isRunning ? durationText(process.at("upS").get<double>() * 1e9) : "-",
-         isRunning ? durationText(process.at("cpuS").get<double>() * 1e9) : "-",
-         isRunning ? fmt::format("{:.1f} MB", process.at("memoryBytes").get<double>() / 1e6) : "-",
+         isRunning ? durationText(process.at("up_s").get<double>() * 1e9) : "-",
+         isRunning ? durationText(process.at("cpu_s").get<double>() * 1e9) : "-",
+         isRunning ? fmt::format("{:.1f} MB", process.at("memory_bytes").get<double>() / 1e6) : "-",
          printableOf(process, "reason")});
   }
   fmt::print("{}", table.fitted("  "));
@@ -112,7 +112,7 @@ std::optional<json> tryUnsupervised(const CrateFolder& folder) {
                          {"state", "unsupervised"},
                          {"pid", process.pid},
                          {"restarts", process.restarts},
-                         {"upS", static_cast<double>(upNs) / 1e9},
+                         {"up_s", static_cast<double>(upNs) / 1e9},
                          {"reason", ""},
                          {"log", folder.log(process.name)}});
   }

@@ -15,8 +15,8 @@ namespace mpf::crate {
   const auto upNs = service.isRunning() ? Clock::nowNs() - service.startedNs() : 0;
   nlohmann::json json{
       {"name", service.plan().name},        {"state", toString(service.state())},
-      {"isStalled", service.isStalled()},   {"pid", service.pid()},
-      {"restarts", service.restarts()},     {"upS", static_cast<double>(upNs) / 1e9},
+      {"is_stalled", service.isStalled()},   {"pid", service.pid()},
+      {"restarts", service.restarts()},     {"up_s", static_cast<double>(upNs) / 1e9},
       {"reason", service.reason()},         {"needs", service.plan().needs},
       {"servers", service.plan().servers},  {"command", service.plan().command},
       {"notifies", service.plan().notifies}};
@@ -24,7 +24,7 @@ namespace mpf::crate {
     json["handling"] = {{"server", work->server},
                         {"type", toString(static_cast<MessageType>(work->handling.type))},
                         {"cmd", work->handling.cmd},
-                        {"forS", static_cast<double>(work->forNs) / 1e9}};
+                        {"for_s", static_cast<double>(work->forNs) / 1e9}};
   }
   return json;
 }

@@ -47,7 +47,7 @@ void registerCommands() {
     (*registrar)();
 }
 
-// Loads base.dbd and mpf.dbd, the break tables of thermocouples, and QSRV 2 (pvAccess) if this
+// Loads base.dbd and mpf.dbd, the breakpoint tables of thermocouples, and QSRV 2 (pvAccess) if this
 // installation has it.
 void loadDefinitions(const std::string& folder) {
   std::vector<std::string> names{"base.dbd", "mpf.dbd"};

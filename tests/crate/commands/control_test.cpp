@@ -105,7 +105,7 @@ TEST_F(ControlTest, AProgramThatDoesNotReportIsLookedAtForASecond) {
 
   EXPECT_EQ(runCommand(MPF " restart mute --wait 900").status, 0);
 
-  EXPECT_GE(process("mute").at("upS"), 1);
+  EXPECT_GE(process("mute").at("up_s"), 1);
 }
 
 TEST_F(ControlTest, AStopNamesTheProcessesThatContinue) {

@@ -58,7 +58,7 @@ TEST_F(SupervisorTest, ShowsTheRequestOfABusyServer) {
   EXPECT_EQ(work.at("server"), "victim");
   EXPECT_EQ(work.at("type"), "int32");
   EXPECT_EQ(work.at("cmd"), 11);
-  EXPECT_GE(work.at("forS"), 1);
+  EXPECT_GE(work.at("for_s"), 1);
   EXPECT_THAT(
       text, testing::ContainsRegex("  one +busy .*\n  busy: one, server victim, with int32 cmd=11 "
                                    "for [0-9.]+ s\n"));
