@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // mpf ps: the processes of the crates that run. mpf logs: what a process has printed.
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/inotify.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -197,14 +198,26 @@ std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
   return std::max<std::int64_t>(0, offset - blocks * kLogBlockBytes);
 }
 
-// Prints what is appended to the file, until a signal ends the program.
+// Waits until the file may have grown. Returns false when nobody can read stdout any more.
+bool tryWait(const FileDescriptor& events) {
+  std::array<pollfd, 2> polled{{{events.get(), POLLIN, 0}, {STDOUT_FILENO, 0, 0}}};
+  checkCall(retryInterrupted([&] { return ::poll(polled.data(), polled.size(), -1); }), "poll");
+  std::array<char, 4096> bytes{};
+  if ((polled[0].revents & POLLIN) != 0)
+    checkCall(retryInterrupted([&] { return ::read(events.get(), bytes.data(), bytes.size()); }),
+              "read", "inotify");
+  return (polled[1].revents & (POLLERR | POLLHUP)) == 0;
+}
+
+// Prints what is appended to the file, until a signal ends the program, or the program that reads
+// stdout has ended.
 //   throws  std::system_error, for example when stdout is full
-[[noreturn]] void follow(const std::string& path, std::int64_t offset) {
+void follow(const std::string& path, std::int64_t offset) {
   const FileDescriptor events(checkCall(::inotify_init1(IN_CLOEXEC), "inotify_init1"));
   checkCall(::inotify_add_watch(events.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
   const FileDescriptor file(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));
   std::array<char, 65536> bytes{};
-  for (;;) {
+  do {
     for (;;) {
       offset = continueAt(file, offset);
       const auto length = ::pread(file.get(), bytes.data(), bytes.size(), offset);
@@ -213,9 +226,7 @@ std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
       fmt::print("{}", printableLines({bytes.data(), static_cast<std::size_t>(length)}));
     }
     if (std::fflush(stdout) != 0) throw std::system_error(errno, std::generic_category(), "write");
-    checkCall(retryInterrupted([&] { return ::read(events.get(), bytes.data(), bytes.size()); }),
-              "read", "inotify");
-  }
+  } while (tryWait(events));
 }
 
 struct LogText {

@@ -187,6 +187,12 @@ TEST_F(LogsTest, FollowingEndsWhenTheOutputIsFull) {
   EXPECT_THAT(result.output, HasSubstr("mpf logs: standard output: "));
 }
 
+TEST_F(LogsTest, FollowingEndsWithTheProgramThatReadsTheOutput) {
+  append("one\n");
+
+  EXPECT_EQ(runCommand(command_ + "-f | head -n 1").output, "one\n");
+}
+
 TEST_F(LogsTest, FollowsALogThatIsShortened) {
   append(std::string(std::size_t{3} << 16, '\n') + "last\n");
   mpf::test::Program logs({"/bin/sh", "-c", "exec " + command_ + "-n 1 -f >&2"});
