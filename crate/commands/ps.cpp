@@ -190,10 +190,13 @@ std::string lastLines(const std::string& text, int lines) {
 
 // Where to continue in a log that was read up to `offset`. If it is shorter, the supervisor has
 // removed whole blocks of its beginning. As few as possible are assumed, which is right if less
-// than a block was not read yet; otherwise lines are left out, but none is repeated.
+// than a block was not read yet; otherwise lines are left out, but none is repeated. On other file
+// systems its beginning is a hole, which is left out.
 std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
   struct stat status{};
-  if (::fstat(file.get(), &status) != 0 || status.st_size >= offset) return offset;
+  if (::fstat(file.get(), &status) != 0) return offset;
+  if (status.st_size >= offset)
+    return std::max<std::int64_t>(offset, ::lseek(file.get(), offset, SEEK_DATA));
   const auto blocks = (offset - status.st_size + kLogBlockBytes - 1) / kLogBlockBytes;
   return std::max<std::int64_t>(0, offset - blocks * kLogBlockBytes);
 }

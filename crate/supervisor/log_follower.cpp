@@ -203,7 +203,8 @@ void LogFollower::limit(Log& log) const {
   if (removed == 0) return;
   if (::fallocate(log.file.get(), FALLOC_FL_COLLAPSE_RANGE, 0, removed) == 0)
     log.offset = std::max<std::int64_t>(log.offset - removed, 0);
-  else ::fallocate(log.file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, removed);
+  else if (::fallocate(log.file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, removed) == 0)
+    log.offset = std::max<std::int64_t>(log.offset, removed);  // it does not read the hole
 }
 
 }  // namespace mpf::crate

@@ -14,9 +14,10 @@ namespace mpf::test {
 
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
+  //   parent  with a slash at its end
+  explicit TemporaryFolder(const std::string& parent = testing::TempDir()) {
     // mkdtemp() replaces the last six characters.
-    std::string name = testing::TempDir() + "mpf-test-" + std::string(6, 'X');
+    std::string name = parent + "mpf-test-" + std::string(6, 'X');
     if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
     path_ = name;
   }

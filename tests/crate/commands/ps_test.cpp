@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 // mpf ps: a crate that does not reply. mpf logs: which lines are shown, also of a log that is
 // shortened.
+#include <fcntl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+
+#include <mpf/file_descriptor.h>
 
 #include "base/whole_file.h"
 #include "tests/crate/supervisor/supervisor_fixture.h"
@@ -200,6 +203,24 @@ TEST_F(LogsTest, FollowsALogThatIsShortened) {
 
   removeBeginning(std::size_t{2} << 16);
   append("next\n");
+
+  EXPECT_EQ(logs.line(), "next");
+}
+
+// Other file systems make the beginning of the log a hole.
+TEST_F(LogsTest, FollowsALogWhoseBeginningBecomesAHole) {
+  constexpr std::size_t kHole = std::size_t{2} << 16;
+  const std::string first = "last\n";
+  append(first);
+  mpf::test::Program logs({"/bin/sh", "-c", "exec " + command_ + "-n 1 -f >&2"});
+  ASSERT_EQ(logs.line(), "last");
+
+  logs.stop();
+  append(std::string(kHole - first.size() - 1, '-') + "\nnext\n");
+  const FileDescriptor file(::open(log_.c_str(), O_RDWR | O_CLOEXEC));
+  const auto mode = FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE;
+  ASSERT_EQ(::fallocate(file.get(), mode, 0, kHole), 0);
+  logs.signal(SIGCONT);
 
   EXPECT_EQ(logs.line(), "next");
 }

@@ -200,5 +200,23 @@ TEST_F(LogFollowerTest, RemovesTheFirstHalfOfALogThatIsTooLong) {
   EXPECT_THAT(last, HasSubstr("dac | 2999\n"));
 }
 
+// tmpfs cannot remove the beginning of a file: it becomes a hole.
+TEST_F(LogFollowerTest, DoesNotReadTheHoleOfALogThatIsTooLong) {
+  const mpf::test::TemporaryFolder memory("/dev/shm/");
+  const auto path = memory.file("dac.log");
+  LogFollower follower(false, 1u << 20);
+  follower.add("dac", path);
+  append(path, std::string(std::size_t{3} << 20, '\n') + "last\n");
+
+  follower.maintain();
+
+  std::string text;
+  do {
+    text += follower.takeLines();
+  } while (follower.hasMore());
+  EXPECT_THAT(text, testing::EndsWith("dac | last\n"));
+  EXPECT_EQ(text.find("\\x00"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace mpf::crate::test
