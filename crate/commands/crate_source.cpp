@@ -115,9 +115,7 @@ Crate CrateSource::prepare() const {
   auto startup = readStartup(folder.file(kIocFile), false);
   if (!startup.iocText.empty()) {
     folder.create();
-    OutputFile output(folder.file(kIocFile));
-    output.write(startup.iocText);
-    output.close();
+    replaceFile(folder.file(kIocFile), startup.iocText, 0600);
   }
   return startup.crate;
 }

@@ -89,6 +89,20 @@ TEST_F(RunTest, ARefusedRunOfAStartupFileChangesNothing) {
   EXPECT_EQ(readWholeFile(folder().file("ioc.cmd")), before);
 }
 
+// The file that would replace the commands of the IOC cannot be written.
+TEST_F(RunTest, AReloadOnAFullDiskKeepsTheCommandsOfTheIoc) {
+  start({MPF, "run", "--name", "lab", files_.write("st.cmd", "iocInit\n")});
+  const auto commands = folder().file("ioc.cmd");
+  const auto before = readWholeFile(commands);
+  static_cast<void>(files_.write("st.cmd", "iocInit\nmrr\n"));
+  std::filesystem::create_symlink("/dev/full", commands + ".new");
+
+  EXPECT_THAT([&] { ask({{"do", "reload"}}); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("No space left on device")));
+
+  EXPECT_EQ(readWholeFile(commands), before);
+}
+
 // ---- errors that this host, or a program, finds
 
 constexpr const char* kWrong = R"(backplane = "a b"
