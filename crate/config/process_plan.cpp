@@ -8,6 +8,7 @@
 #include <functional>
 #include <ranges>
 #include <set>
+#include <system_error>
 
 #include "base/program_beside.h"
 #include "base/whole_file.h"
@@ -48,11 +49,20 @@ void addOption(const Setting& setting, const OptionKind* option,
   }
 }
 
+// A program of this installation need not be in PATH. Any other is found as by a shell, also one of
+// a site whose name or folder begins with "mpf".
+std::string pathOf(const std::string& program) {
+  if (!program.starts_with("mpf") || program.find('/') != std::string::npos) return program;
+  auto beside = programBeside(program);
+  std::error_code error;
+  return std::filesystem::exists(beside, error) ? beside : program;
+}
+
 std::vector<std::string> commandOf(const Crate& crate, const Process& process,
                                    const std::string& runFolder) {
   if (process.kind.empty()) {
     auto command = process.command;
-    if (command.front().starts_with("mpf")) command.front() = programBeside(command.front());
+    command.front() = pathOf(command.front());
     return command;
   }
   const auto& kind = *findKind(process.kind);

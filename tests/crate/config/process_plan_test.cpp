@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "base/program_beside.h"
 #include "tests/crate/config/crate_text.h"
 
 // NOLINTBEGIN(modernize-raw-string-literal): a test case is one line
@@ -59,6 +60,16 @@ TEST_F(ProcessPlanTest, DefaultsOfTheCrateReachItsServers) {
             "mpf-router r.toml --mode=0660 --log-level=debug");
   EXPECT_EQ(lineOf(crate + "[[ioc]]\ndatabase = [\"a.db\"]\nmacros = \"P=a:\"\n"),
             "mpf-ioc --database=a.db --macros=P=a: --no-shell");
+}
+
+TEST_F(ProcessPlanTest, OnlyTheNameOfAProgramOfMpfIsThatOfAProgramBesideThisOne) {
+  const auto programOf = [this](const std::string& name) {
+    return plan("[[program]]\nname = \"a\"\ncommand = [\"" + name + "\"]\n").at(0).command.at(0);
+  };
+
+  EXPECT_EQ(programOf("mpf-int32-server"), programBeside("mpf-int32-server"));
+  EXPECT_EQ(programOf("mpf-of-a-site"), "mpf-of-a-site");  // in PATH
+  EXPECT_EQ(programOf("mpf/run.sh"), "mpf/run.sh");  // in the working folder
 }
 
 TEST_F(ProcessPlanTest, TheEnvironmentNamesTheBackplane) {
