@@ -93,6 +93,8 @@ class Tool {
     }
     return {};
   }
+  // Closes the end of the pipe at which its stdout is read.
+  void closeOutput() { out_.reset(); }
   // What it has written to stderr until now.
   [[nodiscard]] std::string err() const {
     std::string text(static_cast<std::size_t>(checkCall(::lseek(err_.get(), 0, SEEK_END), "lseek")),

@@ -12,6 +12,7 @@
 #include "base/print_error.h"
 #include "base/stop_signals.h"
 #include "tools/arguments.h"
+#include "tools/tap/reader_watch.h"
 #include "tools/text/show.h"
 #include "tools/text/wrap.h"
 
@@ -67,6 +68,7 @@ class Sniffer {
 
   void take(Message&& message) {
     if (const auto* connect = message.tryAs<Connect>()) return takeConnect(*connect);
+    if (const auto* fate = message.tryAs<RequestFate>()) return takeFate(*fate);
     if (const auto* reply = message.tryAs<Int32>()) return takeReply(*reply);
     if (const auto records = Char8ArrayMessage::tryFrom(std::move(message))) takeRecords(*records);
   }
@@ -94,6 +96,15 @@ class Sniffer {
       printError("{}: \"{}\" refused to start sniffing: status {}\n", program_, service_,
                  reply.status);
     }
+  }
+
+  // After another fate than this one, the server has gone, and connectNo follows.
+  void takeFate(const RequestFate& fate) {
+    if (fate.fate != Fate::refused) return;
+    wasRefused_ = true;
+    isListening_ = false;
+    printError("{}: \"{}\" refused a request to sniff; check with `mpf ls` that it is {}\n",
+               program_, service_, options_.kind);
   }
 
   // Stops sniffing and receives the bytes of the last few milliseconds, which the server still has.
@@ -135,6 +146,7 @@ class Sniffer {
   Dispatcher dispatcher_;
   MessageClient client_;
   StopSignals stop_;
+  ReaderWatch reader_{[this] { stop(); }};
 };
 
 }  // namespace

@@ -202,5 +202,30 @@ TEST_F(SniffToolTest, ReportsAServerThatRefusesToSniff) {
   thread.join();
 }
 
+TEST_F(SniffToolTest, ReportsAServerOfAnotherKind) {
+  MessageServer server(backplane_, "other.sniff");
+  std::thread thread([&] { server.run(); });
+
+  const auto ended = runTool({"sniff", "other"}, backplane_.name());
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.err, HasSubstr("mpf sniff: \"other.sniff\" refused a request to sniff; check "
+                                   "with `mpf ls` that it is a serial server\n"));
+  server.interrupt();
+  thread.join();
+}
+
+// The line is quiet, so the tool does not write to the pipe.
+TEST_F(SniffToolTest, EndsWithTheProgramThatReadsItsOutput) {
+  listen();
+  const auto tool = sniff();
+
+  tool->closeOutput();
+
+  const auto ended = tool->end();
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.err, HasSubstr("0 bytes seen, 0 missing\n"));
+}
+
 }  // namespace
 }  // namespace mpf::test
