@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // mpf-crate: runs and supervises the processes of a crate file. `mpf run`, `mpf ps` and others
 // execute it.
+#include <signal.h>
+
 #include <CLI/CLI.hpp>
 #include <sstream>
 #include <string>
@@ -54,6 +56,8 @@ int runSubcommand(const std::string& command, int argc, char** argv) try {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // If the parent ignores SIGCHLD, so does this process, and the kernel reports no end of a child.
+  ::signal(SIGCHLD, SIG_DFL);
   const auto command = isSubcommand(argc, argv) ? std::string("mpf ") + argv[1] : "mpf-crate";
   return mpf::runMain(command, [&] { return runSubcommand(command, argc, argv); });
 }

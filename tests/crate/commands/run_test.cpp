@@ -251,6 +251,17 @@ TEST_F(RunCheckTest, ACrateWithSuchErrorsIsNotStarted) {
   EXPECT_THAT(result.output, HasSubstr("queue-size: 0 is out of range"));
 }
 
+TEST_F(RunCheckTest, SuchErrorsAreFoundIfTheParentIgnoresTheEndsOfChildren) {
+  static_cast<void>(files_.write("lab.toml", kServer + "queue-size = 0\n"));
+
+  const auto result = mpf::test::runCommand("cd " + files_.path().string() +
+                                            " && /usr/bin/env --ignore-signal=CHLD " MPF
+                                            " run --check lab.toml 2>&1");
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 2);
+  EXPECT_THAT(result.output, HasSubstr("queue-size: 0 is out of range"));
+}
+
 TEST_F(RunCheckTest, AReloadWithSuchErrorsChangesNothing) {
   run(kServer);
   waitForState("int32", "ready");

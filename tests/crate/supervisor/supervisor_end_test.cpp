@@ -109,6 +109,17 @@ TEST_F(SupervisorEndTest, TellsSystemdThatItStillStops) {
   EXPECT_EQ(WEXITSTATUS(stop()), 0) << "the second signal kills at once";
 }
 
+TEST_F(SupervisorEndTest, RestartsAProcessAlthoughItsParentIgnoresTheEndsOfChildren) {
+  write(kServer);
+  start({"/usr/bin/env", "--ignore-signal=CHLD", MPF, "run", files_.file("lab.toml")});
+  waitForState("int32", "ready");
+  const auto before = pidOf("int32");
+
+  ::kill(before, SIGKILL);
+
+  waitForNew("int32", before);
+}
+
 }  // namespace
 }  // namespace mpf::crate::test
 // NOLINTEND(modernize-raw-string-literal)
