@@ -203,8 +203,11 @@ std::int64_t continueAt(const FileDescriptor& file, std::int64_t offset) {
 
 // Waits until the file may have grown. Returns false when nobody can read stdout any more.
 bool tryWait(const FileDescriptor& events) {
+  constexpr int kLookMs = 500;
   std::array<pollfd, 2> polled{{{events.get(), POLLIN, 0}, {STDOUT_FILENO, 0, 0}}};
-  checkCall(retryInterrupted([&] { return ::poll(polled.data(), polled.size(), -1); }), "poll");
+  const auto longest = events ? -1 : kLookMs;
+  checkCall(retryInterrupted([&] { return ::poll(polled.data(), polled.size(), longest); }),
+            "poll");
   std::array<char, 4096> bytes{};
   if ((polled[0].revents & POLLIN) != 0)
     checkCall(retryInterrupted([&] { return ::read(events.get(), bytes.data(), bytes.size()); }),
@@ -216,8 +219,9 @@ bool tryWait(const FileDescriptor& events) {
 // stdout has ended.
 //   throws  std::system_error, for example when stdout is full
 void follow(const std::string& path, std::int64_t offset) {
-  const FileDescriptor events(checkCall(::inotify_init1(IN_CLOEXEC), "inotify_init1"));
-  checkCall(::inotify_add_watch(events.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
+  FileDescriptor events(::inotify_init1(IN_CLOEXEC));
+  // The user has no watch left, or the file has gone; open() reports the latter.
+  if (::inotify_add_watch(events.get(), path.c_str(), IN_MODIFY) < 0) events.reset();
   const FileDescriptor file(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));
   std::array<char, 65536> bytes{};
   do {

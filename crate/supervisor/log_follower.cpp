@@ -72,7 +72,7 @@ std::string LineFolder::countText() const {
 LogFollower::LogFollower(bool hasColour, std::uint64_t maxBytes)
     : hasColour_(hasColour),
       maxBytes_(maxBytes),
-      events_(checkCall(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK), "inotify_init1")) {}
+      events_(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK)) {}
 
 void LogFollower::add(const std::string& name, const std::string& path) {
   if (logs_.contains(name)) return;
@@ -86,8 +86,7 @@ LogFollower::Log LogFollower::open(const std::string& path) const {
   log.path = path;
   log.file = FileDescriptor(
       checkCall(::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0600), "open", path));
-  log.watch = checkCall(::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY),
-                        "inotify_add_watch", path);
+  log.watch = ::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY);
   return log;
 }
 

@@ -47,9 +47,10 @@ class LineFolder {
 
 class LogFollower {
  public:
+  // A user has few inotify instances (128 by default) and watches. Without one, the descriptor does
+  // not report all changes.
   //   hasColour  whether names are coloured
   //   maxBytes   of each log; the first half of a longer one is removed
-  //   throws     std::system_error
   LogFollower(bool hasColour, std::uint64_t maxBytes);
 
   void setMaxBytes(std::uint64_t maxBytes) noexcept { maxBytes_ = maxBytes; }
@@ -60,7 +61,8 @@ class LogFollower {
   // process has not ended its last line. takeLines() does not return it. Without space on the disk,
   // the line is missing.
   void note(const std::string& name, const std::string& text);
-  // Readable when a log has grown.
+  // Readable when a log has grown; -1 without an inotify instance. Call takeLines() once a second,
+  // too.
   [[nodiscard]] int descriptor() const noexcept { return events_.get(); }
   // Returns new lines, at most about a megabyte of each log; hasMore() tells whether others follow.
   // A line that is longer than 64 KiB comes in parts.
@@ -74,7 +76,7 @@ class LogFollower {
   struct Log {
     std::string path;
     FileDescriptor file;
-    int watch = -1;
+    int watch = -1;  // -1: the user has no watch left
     std::int64_t offset = 0;
     std::string partial;  // a line without its end
     std::deque<std::string> notes;  // lines of note() that were not read yet

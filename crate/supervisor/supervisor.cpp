@@ -242,6 +242,7 @@ void Supervisor::look() {
     for (auto& [backplane, watch] : watches_) watch.look();
     capsuleWriter_.look();
   });
+  if (errors_.isEmpty()) writeError(logs_.takeLines());
   logs_.maintain();
   if (!isRecorded_) tryRecord();
   const auto now = Clock::nowNs();

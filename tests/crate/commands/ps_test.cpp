@@ -207,6 +207,17 @@ TEST_F(LogsTest, FollowsALogThatIsShortened) {
   EXPECT_EQ(logs.line(), "next");
 }
 
+TEST_F(LogsTest, FollowsALogIfTheUserHasNoInotifyInstanceLeft) {
+  append("one\n");
+  mpf::test::Program logs(
+      {"/bin/sh", "-c", "exec env LD_PRELOAD=" MPF_TEST_NO_INOTIFY " " + command_ + "-f >&2"});
+  ASSERT_EQ(logs.line(), "one");
+
+  append("two\n");
+
+  EXPECT_EQ(logs.line(), "two");
+}
+
 // Other file systems make the beginning of the log a hole.
 TEST_F(LogsTest, FollowsALogWhoseBeginningBecomesAHole) {
   constexpr std::size_t kHole = std::size_t{2} << 16;

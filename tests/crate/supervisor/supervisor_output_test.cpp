@@ -92,5 +92,14 @@ TEST_F(SupervisorOutputTest, ContinuesWithoutAReader) {
   EXPECT_EQ(WEXITSTATUS(stop()), 0);
 }
 
+TEST_F(SupervisorOutputTest, PrintsTheLinesOfLogsIfTheUserHasNoInotifyInstanceLeft) {
+  write(kServer);
+  // NOLINTNEXTLINE(bugprone-suspicious-missing-comma): one argument
+  start({"/usr/bin/env", "LD_PRELOAD=" MPF_TEST_NO_INOTIFY, MPF, "run", files_.file("lab.toml")});
+
+  EXPECT_THAT(supervisor_->waitForLine("serving \"Int32\""), testing::StartsWith("int32 | "));
+  waitForState("int32", "ready");
+}
+
 }  // namespace
 }  // namespace mpf::crate::test
