@@ -200,10 +200,13 @@ void LogFollower::limit(Log& log) const {
   if (bytes <= static_cast<std::int64_t>(maxBytes_)) return;
   const auto removed = (status.st_size - bytes / 2) / kLogBlockBytes * kLogBlockBytes;
   if (removed == 0) return;
+  const auto isUnread = log.offset < removed;
   if (::fallocate(log.file.get(), FALLOC_FL_COLLAPSE_RANGE, 0, removed) == 0)
     log.offset = std::max<std::int64_t>(log.offset - removed, 0);
   else if (::fallocate(log.file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, removed) == 0)
     log.offset = std::max<std::int64_t>(log.offset, removed);  // it does not read the hole
+  else return;
+  if (isUnread && !log.partial.empty()) log.partial += '\n';  // the rest of this line was removed
 }
 
 }  // namespace mpf::crate

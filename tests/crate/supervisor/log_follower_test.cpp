@@ -200,6 +200,20 @@ TEST_F(LogFollowerTest, RemovesTheFirstHalfOfALogThatIsTooLong) {
   EXPECT_THAT(last, HasSubstr("dac | 2999\n"));
 }
 
+TEST_F(LogFollowerTest, ALineWhoseRestIsRemovedIsNotJoinedWithALaterOne) {
+  LogFollower follower(false, 1u << 20);
+  follower.add("dac", path_);
+  append(path_, "the first words");
+  EXPECT_EQ(follower.takeLines(), "");
+  std::string lines;
+  while (lines.size() < std::size_t{3} << 20) lines += "a line\n";
+  append(path_, lines);
+
+  follower.maintain();
+
+  EXPECT_THAT(follower.takeLines(), testing::StartsWith("dac | the first words\n"));
+}
+
 // tmpfs cannot remove the beginning of a file: it becomes a hole.
 TEST_F(LogFollowerTest, DoesNotReadTheHoleOfALogThatIsTooLong) {
   const mpf::test::TemporaryFolder memory("/dev/shm/");
