@@ -241,29 +241,41 @@ struct LogText {
   std::int64_t end = 0;  // its offset in the file
 };
 
-// Reads a log without the hole at its beginning, which may be far longer than the text: the
-// supervisor removes old text by punching holes.
-LogText readLog(const std::string& path) {
+// Reads up to `bytes` of a log from `offset` on.
+std::string readFrom(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes) {
+  std::string text(static_cast<std::size_t>(bytes), '\0');
+  std::size_t read = 0;
+  while (read < text.size()) {
+    const auto at = offset + static_cast<std::int64_t>(read);
+    const auto length = retryInterrupted(
+        [&] { return ::pread(file.get(), text.data() + read, text.size() - read, at); });
+    if (checkCall(length, "read", "the log") == 0) break;
+    read += static_cast<std::size_t>(length);
+  }
+  text.resize(read);
+  return text;
+}
+
+// Reads the end of a log with at least `lines` lines, or all of it without the hole at its
+// beginning: the supervisor removes old text by punching holes, and cannot on some file systems.
+LogText readLog(const std::string& path, int lines) {
+  constexpr std::int64_t kFirst = 65536;
   const FileDescriptor file(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));
   LogText log;
   log.end = checkCall(::lseek(file.get(), 0, SEEK_END), "lseek", path);
-  const auto begin = ::lseek(file.get(), 0, SEEK_DATA);
-  if (begin < 0 && errno == ENXIO) return log;  // the file is empty, or a hole
-  log.end = std::max<std::int64_t>(0, begin);  // some file systems cannot seek data
-  std::array<char, 65536> bytes{};
-  for (;;) {
-    const auto length = checkCall(
-        retryInterrupted([&] { return ::pread(file.get(), bytes.data(), bytes.size(), log.end); }),
-        "read", path);
-    if (length == 0) return log;
-    log.text.append(bytes.data(), static_cast<std::size_t>(length));
-    log.end += length;
+  const auto data = ::lseek(file.get(), 0, SEEK_DATA);
+  if (data < 0 && errno == ENXIO) return log;  // the file is empty, or a hole
+  const auto begin = std::max<std::int64_t>(0, data);  // some file systems cannot seek data
+  for (auto bytes = kFirst;; bytes *= 4) {
+    const auto from = std::max(begin, log.end - bytes);
+    log.text = readFrom(file, from, log.end - from);
+    if (from == begin || std::ranges::count(log.text, '\n') > lines) return log;
   }
 }
 
 int showLog(const LogArguments& arguments) try {
   const auto path = chooseFiles(arguments.crate).log(arguments.process);
-  const auto log = readLog(path);
+  const auto log = readLog(path, arguments.lines);
   if (!log.text.empty()) fmt::print("{}", printableLines(lastLines(log.text, arguments.lines)));
   if (arguments.follow) follow(path, log.end);
   return 0;

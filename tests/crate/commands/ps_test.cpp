@@ -181,6 +181,19 @@ TEST_F(LogsTest, DoesNotReadTheHoleOfALog) {
   EXPECT_EQ(text.output, "one\ntwo\n");
 }
 
+// The log has not been shortened. The test allows less memory than it has bytes.
+TEST_F(LogsTest, ReadsOnlyTheEndOfALongLog) {
+  append("first\n");
+  std::filesystem::resize_file(log_, std::size_t{3} << 30);
+  append("\none\ntwo\n");
+  const auto limited = (mpf::test::kIsSanitized ? "" : "ulimit -v 2000000; ") + command_;
+
+  const auto result = runCommand(limited + "-n 1 2>&1");
+
+  EXPECT_EQ(result.output, "two\n");
+  EXPECT_EQ(result.status, 0);
+}
+
 TEST_F(LogsTest, FollowingEndsWhenTheOutputIsFull) {
   append("one\n");
 
