@@ -101,6 +101,26 @@ async def test_a_call_times_out(silent: Silent) -> None:
     assert silent[1]
 
 
+class WithoutTimer(mpf.AsyncClient):
+    """Its calls see the end of their time before the connection does."""
+
+    def _set_timer(self) -> None:
+        pass
+
+
+async def test_a_call_that_expires_delays_no_reply_to_another(server: mpf.Server) -> None:
+    async with WithoutTimer("tested", timeout=math.inf) as client:
+        waiting = asyncio.ensure_future(client.call(mpf.Int32(1)))
+        request = await asyncio.to_thread(server._receive, PATIENCE)
+        assert request is not None
+        with pytest.raises(mpf.Expired):  # nobody takes it
+            await client.call(mpf.Int32(2), timeout=0.01)
+
+        server.reply(request, mpf.Int32(3))
+
+        assert (await asyncio.wait_for(waiting, PATIENCE)).value == 3
+
+
 async def test_a_cancelled_task_cancels_its_request(silent: Silent, backplane: str) -> None:
     server, kept, came = silent
     async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:

@@ -322,7 +322,10 @@ class AsyncClient(AsyncClosing, _mpf.BaseClient):
     async def _end(self, request: Request, limit: float, check: bool) -> Message:
         while (reply := request.result(check=check)) is None:
             if not await self._changed(request.id, limit):
-                return request.wait(check=check)  # raises: its time has passed
+                try:
+                    return request.wait(check=check)  # raises: its time has passed
+                finally:
+                    self._drain()  # wait() has taken what arrived for others, too
         return reply
 
 
