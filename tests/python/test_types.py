@@ -26,6 +26,10 @@ with mpf.Client("dac") as client:
     loaned.value[:] = 0.5
     client.call(loaned, retry=True)
     requests: list[mpf.Request] = client.send_many(mpf.Int32(i) for i in range(3))
+    status: int = client.call(mpf.SerialConfig(baud=9600)).status
+
+async def configure(line: mpf.AsyncClient) -> int:
+    return (await line.call(mpf.SerialConfig(baud=9600), 1.0)).status
 
 server = mpf.Server("camera")
 subscribers: list[mpf.Int32] = []

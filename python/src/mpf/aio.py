@@ -13,7 +13,16 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mpf import _mpf
-from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
+from mpf._mpf import (
+    Char8Array,
+    Float64,
+    Float64Array,
+    Int32,
+    Int32Array,
+    Message,
+    Request,
+    SerialConfig,
+)
 from mpf.aio_requests import CONNECTION, AsyncRequest, AsyncSubscription
 from mpf.client import LIMIT
 from mpf.closing import AsyncClosing
@@ -68,6 +77,14 @@ class AsyncClient(AsyncClosing, _mpf.BaseClient):
                 return False
         return True
 
+    @overload
+    async def call(
+        self,
+        message: SerialConfig,
+        timeout: float | None = None,
+        *,
+        retry: bool = False,
+    ) -> Int32: ...
     @overload
     async def call(
         self,

@@ -12,7 +12,16 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mpf import _mpf
-from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
+from mpf._mpf import (
+    Char8Array,
+    Float64,
+    Float64Array,
+    Int32,
+    Int32Array,
+    Message,
+    Request,
+    SerialConfig,
+)
 from mpf.closing import Closing
 from mpf.subscription import Subscription
 
@@ -51,6 +60,14 @@ class Client(Closing, _mpf.BaseClient):
 
     if TYPE_CHECKING:
 
+        @overload
+        def call(
+            self,
+            message: SerialConfig,
+            timeout: float | None = None,
+            *,
+            retry: bool = False,
+        ) -> Int32: ...
         @overload
         def call(
             self,
