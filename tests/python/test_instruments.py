@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import os
 import threading
+import time
 import tty
 from collections.abc import Callable, Iterator
 
@@ -125,6 +126,41 @@ def test_a_negative_time_of_an_instrument_leaves_that_of_the_queue(server: mpf.S
     with server.start(), mpf.Serial("tested", queue_timeout=PATIENCE) as meter:
         for timeout in (-math.inf, -2 * PATIENCE):
             assert meter.query("VOLT?\r", timeout=timeout) == b"1 ms"
+
+
+class LateClient:
+    """Stands for a client whose server is absent for three seconds."""
+
+    def __init__(self, pass_time: Callable[[float], None]) -> None:
+        self.limits: list[float] = []
+        self._pass_time = pass_time
+
+    def wait_connected(self, timeout: float) -> bool:
+        self._pass_time(3.0)
+        return True
+
+    def call(self, request: mpf.Message, timeout: float, **options: object) -> mpf.Char8Array:
+        self.limits.append(timeout)
+        return mpf.Char8Array(b"+1.25")
+
+
+def test_both_times_begin_before_the_wait_for_the_connection(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 100.0
+
+    def pass_time(seconds: float) -> None:
+        nonlocal now
+        now += seconds
+
+    late = LateClient(pass_time)
+    with mpf.Serial("meter", timeout=2.0, queue_timeout=4.0) as meter:
+        with monkeypatch.context() as changed:
+            changed.setattr(meter, "client", late)
+            changed.setattr(time, "monotonic", lambda: now)
+            assert meter.query("VOLT?\r") == b"+1.25"
+
+    assert late.limits == [3.0]  # of six seconds
 
 
 def test_an_operation_that_waits_for_others_expires(silent: Silent) -> None:

@@ -15,6 +15,7 @@ writes and reads belongs together. The commands are those of <mpf/serial_command
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 from mpf._mpf import Char8Array, Int32, Message, SerialConfig
@@ -149,9 +150,10 @@ class Instrument(Closing):
         return reply
 
     def _call(self, request: Message, limit: float, **options: Any) -> Message:
+        end = time.monotonic() + max(limit, 0.0) + self.queue_timeout
         # Without a connection, call() raises the reason at once.
         isConnected = self.client.wait_connected(self.queue_timeout)
-        timeout = max(limit, 0.0) + self.queue_timeout if isConnected else 0.0
+        timeout = end - time.monotonic() if isConnected else 0.0
         reply: Message = self.client.call(request, timeout, **options)
         return reply
 
