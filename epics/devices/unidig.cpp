@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Device support of a GreenSpring IP-Unidig: DTYP "Greenspring IP-Unidig".
 //
-//   longin  INP "#C<location> S0 @<module>In"        all inputs; subscribes when it processes
+//   longin  INP "#C<location> S0 @<module>In"        all inputs; subscribes when it processes, with
+//                                                    SCAN "I/O Intr" when the server connects
 //   bi      INP "#C0 S<bit> @<name of the longin>"   SCAN "I/O Intr": one bit of that record
 //   bo      OUT "#C<location> S<bit> @<module>Out"   one output
 //
@@ -10,6 +11,7 @@
 #include <biRecord.h>
 #include <boRecord.h>
 #include <dbAccess.h>
+#include <dbScan.h>
 #include <dbStaticLib.h>
 #include <fmt/format.h>
 #include <longinRecord.h>
@@ -42,7 +44,9 @@ struct InputState {
 class DevLiUnidig final : public DevMpf {
  public:
   explicit DevLiUnidig(longinRecord* record)
-      : DevMpf(reinterpret_cast<dbCommon*>(record), &record->inp, true) {}
+      : DevMpf(reinterpret_cast<dbCommon*>(record), &record->inp, true) {
+    scanIoInit(&bits_);
+  }
   static DevLiUnidig* of(const dbCommon* record) {
     return static_cast<DevLiUnidig*>(static_cast<DevMpf*>(record->dpvt));
   }
@@ -50,6 +54,9 @@ class DevLiUnidig final : public DevMpf {
     const std::lock_guard lock(mutex_);
     return state_;
   }
+  // The scan list of the bi records. That of the longin itself is ioScan(), which nobody requests:
+  // each message processes the record.
+  IOSCANPVT bits() const noexcept { return bits_; }
   long startIO(dbCommon*) override {
     return sendReply(Int32Message({.cmd = digital::cmdStartMonitor}));
   }
@@ -64,8 +71,12 @@ class DevLiUnidig final : public DevMpf {
   }
   void connectIO(dbCommon* record, const Connect& connect) override {
     DevMpf::connectIO(record, connect);
-    if (connect.status != ConnectStatus::connectYes && record->pact == FALSE)
+    if (record->pact != FALSE) return;
+    if (connect.status != ConnectStatus::connectYes) {
       publish(*record, {.severity = record->sevr, .status = record->stat, .reason = record->amsg});
+    } else if (record->scan == SCAN_IO_EVENT) {
+      dbProcess(record);
+    }
   }
   static long init(dbCommon* record) {
     return bindDevice<DevLiUnidig>(reinterpret_cast<longinRecord*>(record));
@@ -89,9 +100,10 @@ class DevLiUnidig final : public DevMpf {
       const std::lock_guard lock(mutex_);
       state_ = std::move(state);
     }
-    scanIoRequest(ioScan());
+    scanIoRequest(bits_);
   }
 
+  IOSCANPVT bits_ = nullptr;
   mutable std::mutex mutex_;
   InputState state_;  // under mutex_
 };
@@ -177,10 +189,11 @@ long readBit(dbCommon* common) {
   return 0;
 }
 
-long scanOfBit(int detach, dbCommon* common, IOSCANPVT* scan) {
+long scanOfBit(int /*detach*/, dbCommon* common, IOSCANPVT* scan) {
   const auto* bit = static_cast<const InputBit*>(common->dpvt);
   if (bit == nullptr) return S_dev_noDevSup;
-  return DevMpf::getIoIntInfo(detach, bit->inputs, scan);
+  *scan = DevLiUnidig::of(bit->inputs)->bits();
+  return 0;
 }
 
 MpfDset devBiUnidig{{5, nullptr, nullptr, initBit, scanOfBit}, readBit, nullptr};

@@ -39,6 +39,35 @@ TEST_F(UnidigRecordTest, InputsFollowEachChange) {
   Ioc::waitFor("bit0", "off");
 }
 
+// Each message processes the longin, which must not ask for the next one by itself.
+TEST_F(UnidigRecordTest, InputsWithIoEventScanningSubscribeOnceAndFollowEachChange) {
+  for (const std::string pini : {"YES", "NO"}) {
+    SCOPED_TRACE("PINI " + pini);
+    std::atomic<int> requests = 0;
+    const ThreadServer server(backplane_, "c-UnidigIn",
+                              [&](MessageServer& self, Message&& request) {
+                                ++requests;
+                                for (std::int32_t value = 1; value <= 20; ++value) {
+                                  auto reply = self.allocReplyMessage<Int32>(request);
+                                  reply->value = value;
+                                  static_cast<void>(self.reply(std::move(reply)));
+                                }
+                              });
+    const Ioc ioc(R"(
+      record(longin, "in") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @c-UnidigIn")
+        field(SCAN, "I/O Intr") field(PINI, ")" +
+                  pini + R"(") }
+      record(bi, "bit4") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S4 @in")
+        field(SCAN, "I/O Intr") field(ZNAM, "off") field(ONAM, "on") }
+    )");
+
+    while (requests < 2 && Ioc::get("in") != "20") std::this_thread::yield();
+
+    ASSERT_EQ(requests, 1);
+    Ioc::waitFor("bit4", "on");
+  }
+}
+
 TEST_F(UnidigRecordTest, OutputsSetAndClearTheirBit) {
   std::atomic<std::int32_t> outputs = 0xff;
   const ThreadServer server(backplane_, "c-UnidigOut", [&](MessageServer& self, Message&& request) {
