@@ -125,7 +125,7 @@ template <class Record>
 void setFieldMask(Record& record, const Options& options) {
   if (options.shift) record.shft = static_cast<epicsUInt16>(*options.shift);
   if (options.mask) record.mask = *options.mask;
-  else record.mask = (record.nobt == 0 ? UINT32_MAX : record.mask) << std::min(+record.shft, 31);
+  else record.mask = (record.mask == 0 ? UINT32_MAX : record.mask) << std::min(+record.shft, 31);
 }
 
 template <class Record>

@@ -7,9 +7,9 @@
 //   load(record, options, scratch)    output records; nullopt: the value does not fit
 //
 // Bits: RVAL of a bit record is the value & MASK, as with "Raw Soft Channel". A mask= of the link
-// is MASK itself; without one, NOBT bits from bit SHFT on. A longin and its kin with a mask= or
-// shift= have the selected bits as VAL: (value & mask) >> shift. A value with other bits does not
-// fit.
+// is MASK itself; without one, the bits of MASK of the database, or else NOBT bits, from bit SHFT
+// on. A longin and its kin with a mask= or shift= have the selected bits as VAL:
+// (value & mask) >> shift. A value with other bits does not fit.
 #pragma once
 
 #include <aaiRecord.h>

@@ -55,6 +55,18 @@ TEST_F(MbbiDirectDigitalIo, ReadsTheBitsOfAMask) {
   EXPECT_EQ(Ioc::get("polled"), std::to_string(0xb00e));
 }
 
+// MASK of the database, without mask= in the link: as with "Raw Soft Channel", from bit SHFT on.
+TEST_F(MbbiDirectDigitalIo, ReadsTheBitsOfMaskOfTheDatabase) {
+  startServers();
+  model_->setInputs(kAll, 0xabcdef);
+  const Ioc ioc(polled("address=-1 shift=4", "field(MASK, \"0xf0f\")"));
+
+  waitForServer("polled");
+
+  EXPECT_EQ(Ioc::get("polled.MASK"), std::to_string(0xf0f0));
+  EXPECT_EQ(Ioc::get("polled"), std::to_string(0xc0e));
+}
+
 // SHFT of the database, without shift= in the link; address= is the server's own mask.
 TEST_F(MbbiDirectDigitalIo, ReadsTheBitsOfShftOfTheDatabase) {
   startServers();
