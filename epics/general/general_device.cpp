@@ -45,6 +45,7 @@ bool isExpired(const Message& message) {
 
 // Makes an alarm visible that was set while the record did not process.
 void postAlarm(dbCommon* record) {
+  recGblGetTimeStamp(record);
   const auto mask = recGblResetAlarms(record);
   auto* value = reinterpret_cast<char*>(record) + record->rdes->pvalFldDes->offset;
   if (mask != 0) db_post_events(record, value, mask);

@@ -126,15 +126,6 @@ TEST_F(DevMpfTest, AServerThatDoesNotReplyIsATimeoutAlarm) {
   kept.clear();
 }
 
-epicsTimeStamp stampOf(const char* name) {
-  DBADDR address;
-  EXPECT_EQ(dbNameToAddr(name, &address), 0);
-  dbScanLock(address.precord);
-  const auto stamp = address.precord->time;
-  dbScanUnlock(address.precord);
-  return stamp;
-}
-
 const std::string kStampedRecord =
     "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@adc value=7\")"
     " field(PINI, \"YES\") field(TSE, \"-2\") }";
@@ -147,8 +138,8 @@ TEST_F(DevMpfTest, ADeviceTimeStampIsThatOfTheServer) {
   });
   const Ioc ioc(kStampedRecord);
   Ioc::waitFor("v", "7");
-  EXPECT_EQ(stampOf("v").secPastEpoch, 946'684'800u - POSIX_TIME_AT_EPICS_EPOCH);
-  EXPECT_EQ(stampOf("v").nsec, 123'456'789u);
+  EXPECT_EQ(Ioc::timeOf("v").secPastEpoch, 946'684'800u - POSIX_TIME_AT_EPICS_EPOCH);
+  EXPECT_EQ(Ioc::timeOf("v").nsec, 123'456'789u);
 }
 
 // Times that EPICS cannot represent: the time of the IOC.
@@ -164,7 +155,7 @@ TEST_F(DevMpfTest, AnImpossibleTimeStampIsNotUsed) {
     });
     const Ioc ioc(kStampedRecord);
     Ioc::waitFor("v", "7");
-    const auto stamp = stampOf("v");
+    const auto stamp = Ioc::timeOf("v");
     EXPECT_GE(epicsTimeDiffInSeconds(&stamp, &before), 0) << stampNs;
   }
 }
@@ -176,7 +167,7 @@ TEST_F(DevMpfTest, ADeviceTimeStampIsTheTimeOfAMessageWithoutOne) {
   const Ioc ioc(kStampedRecord);
   Ioc::waitFor("v", "7");
 
-  const auto stamp = stampOf("v");
+  const auto stamp = Ioc::timeOf("v");
   epicsTimeStamp after;
   epicsTimeGetCurrent(&after);
   EXPECT_GE(epicsTimeDiffInSeconds(&stamp, &before), 0);
@@ -198,10 +189,10 @@ TEST_F(DevMpfTest, ADeviceTimeStampOfAFailureIsTheCurrentTime) {
   server.reset();
   Ioc::waitFor("v.STAT", "COMM");
 
-  const auto atEnd = stampOf("v");
+  const auto atEnd = Ioc::timeOf("v");
   EXPECT_GE(epicsTimeDiffInSeconds(&atEnd, &before), 0);
   static_cast<void>(Ioc::put("v.PROC", "1"));
-  const auto atProcessing = stampOf("v");
+  const auto atProcessing = Ioc::timeOf("v");
   EXPECT_GT(epicsTimeDiffInSeconds(&atProcessing, &atEnd), 0);
 }
 

@@ -5,6 +5,7 @@
 #include <alarm.h>
 #include <array>
 #include <dbAccess.h>
+#include <dbLock.h>
 #include <dbUnitTest.h>
 #include <epicsUnitTest.h>
 #include <errlog.h>
@@ -55,6 +56,15 @@ class Ioc {
     std::array<char, MAX_STRING_SIZE> text{};
     value.copy(text.data(), text.size() - 1);
     return dbPutField(&address, DBR_STRING, text.data(), 1);
+  }
+  // When the record processed, or got its alarm.
+  static epicsTimeStamp timeOf(const std::string& record) {
+    DBADDR address;
+    EXPECT_EQ(dbNameToAddr(record.c_str(), &address), 0);
+    dbScanLock(address.precord);
+    const auto time = address.precord->time;
+    dbScanUnlock(address.precord);
+    return time;
   }
   // Waits until the field has the value.
   static void waitFor(const std::string& field, const std::string& value) {

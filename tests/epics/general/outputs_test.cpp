@@ -192,6 +192,24 @@ TEST_F(GeneralOutputTest, AReadbackThatFailsIsAnAlarmUntilTheRecordWrites) {
   Ioc::waitFor("v.SEVR", "NO_ALARM");
 }
 
+TEST_F(GeneralOutputTest, TheAlarmOfAReadbackThatFailsHasItsTime) {
+  std::atomic<bool> isBusy = true;
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    while (isBusy) std::this_thread::yield();
+    request.tryAs<Int32>()->status = -1;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(longout("@s readback=7"));
+  epicsTimeStamp before;
+  epicsTimeGetCurrent(&before);
+
+  isBusy = false;
+  Ioc::waitFor("v.STAT", "WRITE");
+
+  const auto time = Ioc::timeOf("v");
+  EXPECT_GE(epicsTimeDiffInSeconds(&time, &before), 0);
+}
+
 TEST_F(GeneralOutputTest, AnOutputWritesAgainAfterAReconnectionOnlyWhenTheLinkSaysSo) {
   for (const bool isRewriting : {false, true}) {
     SCOPED_TRACE(isRewriting);
