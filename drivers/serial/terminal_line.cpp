@@ -56,8 +56,10 @@ std::string TerminalLine::tryPrepare() const {
   if (::flock(fd_.get(), LOCK_EX | LOCK_NB) < 0) return "in use by another program";
   if (::ioctl(fd_.get(), TIOCEXCL) < 0)
     return "TIOCEXCL: " + std::generic_category().message(errno);
-  if (auto reason = terminal::tryMakeRaw(fd_.get()); !reason.empty()) return reason;
-  return terminal::tryApply(fd_.get(), settings_);
+  auto reason = terminal::tryMakeRaw(fd_.get());
+  if (reason.empty()) reason = terminal::tryApply(fd_.get(), settings_);
+  if (!reason.empty()) ::ioctl(fd_.get(), TIOCNXCL);
+  return reason;
 }
 
 void TerminalLine::closeDevice() noexcept {

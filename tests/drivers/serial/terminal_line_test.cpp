@@ -100,6 +100,16 @@ TEST_F(TerminalLineTest, NamesTheReasonForWhichItCannotBeOpened) {
               ThrowsMessage<std::invalid_argument>(HasSubstr(device_ + ": ")));
 }
 
+// Another program that does not lock the device may have it open.
+TEST_F(TerminalLineTest, AFailedAttemptDoesNotLeaveTheDeviceExclusive) {
+  const auto other = openDevice();
+  TerminalLine refused(device_, {.bitsPerChar = 7});
+
+  EXPECT_EQ(refused.tryOpen(), OpenState::failed);
+
+  EXPECT_FALSE(isExclusive(other));
+}
+
 TEST_F(TerminalLineTest, ReadsAllByteValuesUnchangedAndDoesNotWaitForMore) {
   ASSERT_EQ(line_.tryOpen(), OpenState::open);
   std::vector<LineByte> bytes;
