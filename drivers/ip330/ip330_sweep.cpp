@@ -11,7 +11,6 @@
 namespace mpf {
 namespace {
 
-// an array of all points is at most half the limit of a message
 bool isTime(double seconds) { return std::isfinite(seconds) && seconds >= 0; }
 
 int scansPerPoint(const Ip330& board, double secondsPerPoint) {

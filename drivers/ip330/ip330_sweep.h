@@ -19,7 +19,8 @@
 
 namespace mpf {
 
-inline constexpr int kIp330MostPoints = 1 << 23;  // of a sweep
+// Points of a sweep: an array of all of them is half the limit of a message.
+inline constexpr int kIp330MostPoints = 1 << 23;
 
 class Ip330Sweep {
  public:
