@@ -30,7 +30,8 @@ LinkOptions optionsOf(const dbCommon* record, const DBLINK& link, const RecordAc
   const auto options = LinkOptions::parse(LinkAddress::of(link).parameters,
                                           {.type = type,
                                            .mode = access.isOutput() ? Mode::write : inputMode,
-                                           .canHaveBits = access.canHaveBits});
+                                           .canHaveBits = access.canHaveBits,
+                                           .canHaveRange = access.canHaveRange});
   if (!makeQuery(options, options.cmd))
     throw std::invalid_argument(
         fmt::format("value={} does not fit type={}", options.value, toString(options.type)));

@@ -38,6 +38,7 @@ struct RecordAccess {
   // The type of messages unless the link has one; none when the record can have no value.
   MessageType (*type)(const dbCommon*);
   bool canHaveBits;  // mask= and shift= of the link
+  bool canHaveRange;  // range= of the link
   // Sets fields of the record that follow from the link.
   void (*prepare)(dbCommon*, const LinkOptions&);
   Stored (*store)(dbCommon*, const MessageValue&, const LinkOptions&);

@@ -168,6 +168,8 @@ LinkOptions LinkOptions::parse(std::string_view text, const Defaults& defaults) 
   if (options.selectsBits() && !canSelectBits(options.type, defaults))
     throw std::invalid_argument(
         "mask=, shift=: use them with type=int32, in a record of a number or of bits");
+  if (options.range && !defaults.canHaveRange)
+    throw std::invalid_argument("range=: use it in an ai or ao record");
   return options;
 }
 

@@ -29,6 +29,7 @@ struct LinkOptions {
     MessageType type = MessageType::int32;
     Mode mode = Mode::read;  // Mode::write for output records
     bool canHaveBits = true;  // of numbers and bits, not of text, arrays and events
+    bool canHaveRange = true;  // of ai and ao
   };
 
   MessageType type = MessageType::int32;  // of requests

@@ -39,6 +39,9 @@ constexpr bool kCanHaveBits =
     requires(Record record) { record.rval; } || std::is_integral_v<decltype(Record::val)>;
 
 template <class Record>
+constexpr bool kCanHaveRange = requires(Record record) { record.eslo; };
+
+template <class Record>
 bool isSmoothed(const dbCommon* common) {
   if constexpr (requires(Record record) { record.smoo; })
     return reinterpret_cast<const Record*>(common)->smoo != 0;
@@ -50,6 +53,7 @@ constexpr RecordAccess accessOf() {
   RecordAccess access{
       .type = typeOf<Record>,
       .canHaveBits = kCanHaveBits<Record>,
+      .canHaveRange = kCanHaveRange<Record>,
       .prepare =
           [](dbCommon* record, const LinkOptions& options) {
             fields::prepare(*reinterpret_cast<Record*>(record), options);

@@ -236,6 +236,20 @@ TEST_F(GeneralRecordTest, AnOutputThatDoesNotFitTheMessageOrTheBitsIsNotWritten)
   }
 }
 
+// Other records than ai and ao would not convert the value.
+TEST_F(GeneralRecordTest, ARangeIsRefusedWhereNothingIsConverted) {
+  const std::string range = "type=int32 range=0:4095";
+  const Ioc ioc(readAtStart("longin", "longin", range) + readAtStart("mbbi", "mbbi", range) +
+                record("int64out", "int64out", "any " + range) +
+                readAtStart("waveform", "wave", "range=0:4095", "field(FTVL, \"LONG\")"));
+
+  for (const std::string name : {"longin", "mbbi", "int64out", "wave"}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(Ioc::get(name + ".PACT"), "1");
+    EXPECT_EQ(Ioc::get(name + ".AMSG"), "range=: use it in an ai or ao record");
+  }
+}
+
 // mask= and shift= of records that have no bits.
 TEST_F(GeneralRecordTest, BitsOfTextArraysAndFloatingPointNumbersAreRefused) {
   const Ioc ioc(
