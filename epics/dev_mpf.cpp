@@ -186,6 +186,8 @@ class DevMpf::Impl final : public SharedClient::Member,
     auto reply = std::move(*reply_);
     reply_.reset();
     if (const auto* fate = reply.tryAs<RequestFate>()) return failFate(fate->fate);
+    if (reply.getType() == MessageType::outOfBand)
+      return device_.fail(record_, "the reply is an OutOfBand message");
     return device_.completeIO(record_, std::move(reply));
   }
   long startIO() {
@@ -220,8 +222,7 @@ class DevMpf::Impl final : public SharedClient::Member,
   }
   void stampNow() { stamp(timeStampOf(0)); }
   void dispatch(Message&& message) {
-    if (message.getType() == MessageType::outOfBand)
-      return device_.outOfBandIO(record_, std::move(message));
+    if (message.getType() == MessageType::outOfBand) return notify(std::move(message));
     switch (SharedClient::replyTypeOf(message)) {
       case replyTypeCompleteIO:
         return complete(std::move(message));
@@ -230,6 +231,12 @@ class DevMpf::Impl final : public SharedClient::Member,
       case replyTypeNone:
         return;
     }
+  }
+  // If the notice has ended the request, the server need not send any other reply.
+  void notify(Message&& notice) {
+    if (endsRequest(notice) && SharedClient::replyTypeOf(notice) == replyTypeCompleteIO)
+      complete(notice.duplicate());
+    device_.outOfBandIO(record_, std::move(notice));
   }
   void complete(Message&& message) {
     const bool isFirst = endsRequest(message);

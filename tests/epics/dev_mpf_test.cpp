@@ -103,6 +103,38 @@ TEST_F(DevMpfTest, AReplyOfAnotherTypeIsAReadAlarm) {
   EXPECT_EQ(Ioc::get("v.AMSG"), "the reply is not an Int32 message");
 }
 
+// A server may send a notice while it keeps a request, which ends by it; a reply may follow.
+TEST_F(DevMpfTest, AnOutOfBandMessageBeforeTheReplyLeavesNoRecordActive) {
+  std::atomic<bool> hasReplied = false;
+  const ThreadServer server(backplane_, "adc", [&](MessageServer& self, Message&& request) {
+    if (!hasReplied) static_cast<void>(self.reply(self.allocReplyMessage<OutOfBand>(request)));
+    static_cast<void>(self.reply(std::move(request)));
+    hasReplied = true;
+  });
+  const Ioc ioc(R"(
+    record(longin, "v") { field(DTYP, "MPF") field(INP, "@adc value=7") field(PINI, "YES") }
+    record(longin, "next") { field(DTYP, "MPF") field(INP, "@adc value=8") }
+  )");
+  while (!hasReplied) std::this_thread::yield();
+
+  static_cast<void>(Ioc::put("next.PROC", "1"));
+  Ioc::waitFor("next", "8");  // after all messages of the other record
+
+  EXPECT_EQ(Ioc::get("v.PACT"), "0");
+  EXPECT_EQ(Ioc::get("v"), "7");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+}
+
+TEST_F(DevMpfTest, AnOutOfBandMessageInPlaceOfAReplyIsAReadAlarm) {
+  const ThreadServer server(backplane_, "adc", [](MessageServer& self, Message&& request) {
+    static_cast<void>(self.reply(self.allocReplyMessage<OutOfBand>(request)));
+  });
+  const Ioc ioc(kRecord);
+
+  Ioc::waitFor("v.STAT", "READ");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "the reply is an OutOfBand message");
+}
+
 TEST_F(DevMpfTest, ANegativeStatusIsAReadAlarm) {
   const ThreadServer server(backplane_, "adc", [](MessageServer& self, Message&& request) {
     request.tryAs<Int32>()->status = -1;

@@ -105,7 +105,9 @@ class DevMpf {
   // Called when the connection is made or has ended. An implementation of a derived class ends with
   // a call of this one.
   virtual void connectIO(dbCommon* record, const Connect& connect);
-  // Called with an OutOfBand message. The default logs it.
+  // Called with an OutOfBand message. The default logs it. If it is the first reply to a request of
+  // sendReply(), the record completes before, with a READ or WRITE alarm; a reply that follows
+  // completes it again.
   virtual void outOfBandIO(dbCommon* record, Message&& message);
   // Called by ai and ao records when fields of the linear conversion change (special_linconv).
   //   pass     0 before the change, 1 after it
