@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "epics/record_queue.h"
+
 namespace mpf {
 namespace {
 
@@ -58,9 +60,7 @@ SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& m
   const std::lock_guard lock(mutex_);
   if (!client_ || !client_->isConnected()) return SendResult::notConnected;
   if (backlog_.empty()) {
-    std::uint32_t id = 0;
-    const auto result = client_->send(std::move(message), deadline, &id);
-    if (result == SendResult::sent) storeId(requestId, id);
+    const auto result = sendLocked(message, deadline, requestId);
     if (!isFull(result)) return result;
   }
   const auto mostBytes = client_->maxMessageBytes();  // 0: has been disconnected meanwhile
@@ -71,6 +71,28 @@ SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& m
   nextDeadline_ = std::min(nextDeadline_, deadline);
   hasBacklog_.store(true, std::memory_order_relaxed);
   return SendResult::sent;
+}
+
+SendResult SharedClient::sendLocked(Message& message, Deadline deadline,
+                                    std::atomic<std::uint32_t>& requestId) {
+  // Allocates before the message is sent.
+  clientTypes_.reserve(clientTypes_.size() + 1);
+  auto entry = clientTypes_.extract(clientTypes_.try_emplace(0, message.getClientType()).first);
+  std::uint32_t id = 0;
+  const auto result =
+      client_ ? client_->send(std::move(message), deadline, &id) : SendResult::notConnected;
+  if (result == SendResult::sent) {
+    entry.key() = id;
+    clientTypes_.insert(std::move(entry));
+    storeId(requestId, id);
+  }
+  return result;
+}
+
+void SharedClient::restoreClientType(Message& message) {
+  if (!endsRequest(message)) return;
+  const auto entry = clientTypes_.extract(message.route().requestId);
+  if (entry) message.setClientType(entry.mapped());
 }
 
 void SharedClient::cancel(std::uint32_t requestId) {
@@ -101,15 +123,9 @@ void SharedClient::endExpired() {
 // Returns false when the queue of the server is full.
 bool SharedClient::trySendFirst() {
   auto& waiting = backlog_.front();
-  const auto clientType = waiting.message.getClientType();
-  std::uint32_t id = 0;
-  const auto result = client_ ? client_->send(std::move(waiting.message), waiting.deadline, &id)
-                              : SendResult::notConnected;
+  const auto result = sendLocked(waiting.message, waiting.deadline, *waiting.requestId);
   if (isFull(result)) return false;
-  if (result == SendResult::sent) {
-    storeId(*waiting.requestId, id);
-  } else {
-    waiting.message.setClientType(clientType);
+  if (result != SendResult::sent) {
     const bool isConnected = result != SendResult::notConnected;
     deliverLocked(fateOf(waiting.message, isConnected ? Fate::refused : Fate::neverTaken));
   }
@@ -138,6 +154,7 @@ void SharedClient::onMessage(Message&& message) {
   if (message.getType() != MessageType::requestFate) setServerStopped(false);  // it has sent this
   {
     const std::lock_guard lock(mutex_);
+    restoreClientType(message);
     deliverLocked(std::move(message));
   }
   serveBacklog();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // SharedClient: the client of one server that all records of the IOC with this server share. The
-// clientType of a message says which record it belongs to, and what happens with the reply.
+// clientType of a message says which record it belongs to, and what happens with the reply. A
+// request ends at the record that sent it, also if the server has changed the clientType.
 //
 //   record ── send() ──► | backlog | ──► MessageClient ──► server
 //   record ◄── Member::deliver() ◄────── MessageClient ◄── replies, fates, connections
@@ -19,6 +20,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include <mpf/epics/dev_mpf.h>
@@ -93,6 +95,9 @@ class SharedClient {
   void onConnect(const Connect& connect);
   void endExpired();
   bool trySendFirst();
+  // As MessageClient::send(). The caller holds the mutex.
+  SendResult sendLocked(Message& message, Deadline deadline, std::atomic<std::uint32_t>& requestId);
+  void restoreClientType(Message& message);
   void endBacklog(Fate fate);
   // To the member that the message is for. The caller holds the mutex.
   void deliverLocked(Message&& message) noexcept;
@@ -103,6 +108,8 @@ class SharedClient {
   std::unique_ptr<MessageClient> client_;  // all below under mutex_
   std::vector<Member*> members_;
   std::deque<Waiting> backlog_;
+  // Of the requests that were sent and have not ended, by their number.
+  std::unordered_map<std::uint32_t, std::int32_t> clientTypes_;
   Deadline nextDeadline_ = Deadline::never();  // none in the backlog is earlier
   bool isBound_ = false;
   bool isConnected_ = false;  // as the members were last told

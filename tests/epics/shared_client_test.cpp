@@ -27,6 +27,10 @@ class RecordingMember final : public SharedClient::Member {
       return message;
     }
   }
+  bool isEmpty() {
+    const std::lock_guard lock(mutex_);
+    return messages_.empty();
+  }
   void expectConnect(ConnectStatus status) {
     const auto message = next();
     const auto* connect = message.tryAs<Connect>();
@@ -96,6 +100,28 @@ TEST_F(SharedClientTest, AReplyReachesTheMemberThatSentTheRequest) {
   EXPECT_EQ(valueOf(reply), 2);
   EXPECT_EQ(SharedClient::replyTypeOf(reply), replyTypeCompleteIO);
   EXPECT_EQ(valueOf(one_.next()), 1);
+}
+
+// Otherwise the record that sent the request would wait for its end for ever.
+TEST_F(SharedClientTest, AReplyWithTheClientTypeOfAnotherMemberReachesTheSender) {
+  const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
+    constexpr std::int32_t kOtherMember = 1 << 2;
+    request.setClientType((request.getClientType() ^ kOtherMember) & ~3);
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const auto one = client_.add(one_);
+  static_cast<void>(client_.add(two_));
+  client_.bind();
+  one_.expectConnect(ConnectStatus::connectYes);
+  two_.expectConnect(ConnectStatus::connectYes);
+
+  EXPECT_EQ(send(one, 1), SendResult::sent);
+
+  while (one_.isEmpty() && two_.isEmpty()) std::this_thread::yield();
+  ASSERT_FALSE(one_.isEmpty());
+  const auto reply = one_.next();
+  EXPECT_EQ(valueOf(reply), 1);
+  EXPECT_EQ(SharedClient::replyTypeOf(reply), replyTypeCompleteIO);
 }
 
 TEST_F(SharedClientTest, RequestsThatDoNotFitTheQueueWaitInOrder) {
