@@ -6,6 +6,7 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import importlib
+import signal
 import sys
 import threading
 import types
@@ -97,6 +98,29 @@ def test_a_thread_of_the_event_loop_may_close_the_server(
             call(mpf.Int32())
 
         assert running.result() is None
+
+
+def test_run_keeps_a_handler_of_sigterm_that_a_handler_of_requests_has_set(
+    server: mpf.Server,
+) -> None:
+    def own(number: int, frame: object) -> None: ...
+
+    @server.on(mpf.Int32)
+    def take_over(request: mpf.Int32) -> int:
+        signal.signal(signal.SIGTERM, own)
+        server.interrupt()
+        return 5
+
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        with concurrent.futures.ThreadPoolExecutor() as threads:
+            calling = threads.submit(call, mpf.Int32())
+            server.run()
+            assert calling.result() == 5
+
+        assert signal.getsignal(signal.SIGTERM) is own
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_an_async_generator_that_closes_the_server_ends(server: mpf.Server) -> None:

@@ -61,4 +61,5 @@ def at_sigterm(act: Callable[[], None]) -> Generator[None]:
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        if signal.getsignal(signal.SIGTERM) is handle:  # the program may have set its own since
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
