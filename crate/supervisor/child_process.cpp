@@ -101,6 +101,7 @@ ChildProcess::ChildProcess(const ProcessPlan& plan, const std::string& log,
                            const std::string& notifySocket) {
   Pipe gate;
   Pipe failure;
+  checkCall(::fcntl(failure.reading.get(), F_SETFL, O_NONBLOCK), "fcntl");
   const FileDescriptor logFile(
       checkCall(::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600), "open", log));
   const auto user = userOf(plan);
@@ -117,11 +118,16 @@ ChildProcess::ChildProcess(const ProcessPlan& plan, const std::string& log,
   failure_ = std::move(failure.reading);
 }
 
-std::string ChildProcess::open() {
+void ChildProcess::open() {
   const char opened = 1;
   checkCall(retryInterrupted([&] { return ::write(gate_.get(), &opened, 1); }), "write", "gate");
+  gate_.reset();
+}
+
+std::optional<std::string> ChildProcess::tryResult() const {
   int why = 0;
   const auto length = retryInterrupted([&] { return ::read(failure_.get(), &why, sizeof why); });
+  if (length < 0 && errno == EAGAIN) return std::nullopt;
   return length == sizeof why ? std::string(std::strerror(why)) : std::string();
 }
 

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 // ChildProcess: starts the process of a plan behind a gate, so that it is recorded before it runs.
 //
-//   fork ─► child waits at the gate ─► the supervisor records its pid ─► open() ─► exec
+//   fork ─► child waits at the gate ─► the supervisor records its pid ─► open() ─► exec ─► result
+//
+// Between open() and exec the child may wait long, for example for a server that has the groups of
+// its user, or a folder: the supervisor does not wait for it.
 //
 // A supervisor that is killed before open() closes the gate with its end: the child then exits
 // without having run the program. Therefore each program that runs is in the record, except while
@@ -32,8 +35,14 @@ class ChildProcess {
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
   [[nodiscard]] std::uint64_t startTicks() const noexcept { return startTicks_; }
-  // Lets the program run. Returns an empty text, or why it cannot be executed.
-  [[nodiscard]] std::string open();
+  // Lets the program run.
+  //   throws  std::system_error
+  void open();
+  // Readable when tryResult() has a value.
+  [[nodiscard]] int descriptor() const noexcept { return failure_.get(); }
+  // Call it after open(). An empty text: the program is executed, or the child has been killed;
+  // otherwise why it cannot be. nullopt: it is not known yet.
+  [[nodiscard]] std::optional<std::string> tryResult() const;
 
  private:
   pid_t pid_ = 0;

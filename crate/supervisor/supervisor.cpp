@@ -17,7 +17,6 @@
 #include "base/service_manager.h"
 #include "base/signal_name.h"
 #include "base/system_call.h"
-#include "crate/supervisor/child_process.h"
 
 namespace mpf::crate {
 namespace {
@@ -132,22 +131,37 @@ void Supervisor::start(Member& member) {
   auto& service = member.service;
   const auto& plan = service.plan();
   try {
-    ChildProcess child(plan, folder_.log(plan.name), notify_.name());
+    auto& child = member.child.emplace(plan, folder_.log(plan.name), notify_.name());
     member.isNotified = false;
     service.started(child.pid(), child.startTicks(), Clock::nowNs());
     capsuleWriter_.watch(service);
     logs_.note(plan.name, fmt::format("started, pid {}", child.pid()));
     nextLookNs_ = 0;
     tryRecord();
-    if (const auto why = child.open(); !why.empty())
-      throw std::runtime_error(
-          fmt::format("{} in {}: {}", plan.command.front(), plan.workingFolder, why));
+    child.open();
   } catch (const std::exception& error) {
-    capsuleWriter_.forget(service);  // its child, if there is one, ends by itself
-    service.startFailed(fmt::format("cannot be started: {}", error.what()), Clock::nowNs());
-    logs_.note(plan.name, service.reason());
-    log(service, service.reason());
+    failStart(member, error.what());
   }
+}
+
+void Supervisor::failStart(Member& member, const std::string& why) {
+  auto& service = member.service;
+  member.child.reset();
+  capsuleWriter_.forget(service);  // its child, if there is one, ends by itself
+  service.startFailed("cannot be started: " + why, Clock::nowNs());
+  logs_.note(service.plan().name, service.reason());
+  log(service, service.reason());
+}
+
+// After a stop was requested, the end of the child is that of the process.
+void Supervisor::takeStart(Member& member) {
+  const auto why = member.child ? member.child->tryResult() : std::nullopt;
+  if (!why) return;
+  member.child.reset();
+  nextLookNs_ = 0;
+  const auto& plan = member.service.plan();
+  if (!why->empty() && member.service.state() == ServiceState::starting)
+    failStart(member, fmt::format("{} in {}: {}", plan.command.front(), plan.workingFolder, *why));
 }
 
 void Supervisor::signal(Member& member, int number) {
@@ -192,7 +206,9 @@ void Supervisor::reapChildren() {
     if (member != members_.end()) ::kill(-*pid, SIGKILL);
     int status = 0;
     ::waitpid(*pid, &status, 0);
-    if (member != members_.end()) handleEnd(**member, {status});
+    if (member == members_.end()) continue;
+    takeStart(**member);
+    if ((*member)->service.pid() == *pid) handleEnd(**member, {status});
   }
 }
 
@@ -269,6 +285,7 @@ void Supervisor::look() {
 
 std::string Supervisor::whatIsMissing(const Member& member) const {
   const auto& plan = member.service.plan();
+  if (member.child) return "its program is not executed yet: its user or its folder may be slow";
   if (plan.notifies && !member.isNotified) return "it has not reported that it is ready";
   const auto servers =
       watches_.at(plan.backplane).notServing(member.service.pid(), plan.location, plan.servers);
@@ -314,6 +331,8 @@ void Supervisor::wait() {
     adopted.push_back(member.get());
     polled.push_back({member->adopted.get(), POLLIN, 0});
   }
+  for (const auto& member : members_)
+    if (member->child) polled.push_back({member->child->descriptor(), POLLIN, 0});
   const auto firstWitness = static_cast<std::ptrdiff_t>(polled.size());
   capsuleWriter_.addTo(polled);
   const auto firstControl = static_cast<std::ptrdiff_t>(polled.size());
@@ -322,7 +341,9 @@ void Supervisor::wait() {
 
   for (std::size_t i = 0; i < adopted.size(); ++i)
     if (polled[firstAdopted + i].revents != 0) handleEnd(*adopted[i], {});
+  for (const auto& member : members_) takeStart(*member);
   if (polled[0].revents != 0) handleSignals();
+  if (nextLookNs_ == 0) look();  // first, so that the replies have the present states
   control_.handle({polled.begin() + firstControl, polled.end()});
   if (errors_.isEmpty() && (polled[1].revents != 0 || logs_.hasMore()))
     writeError(logs_.takeLines());  // otherwise the lines wait in their files

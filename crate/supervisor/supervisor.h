@@ -17,12 +17,14 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/error_queue.h"
 #include "base/log_limiter.h"
 #include "crate/supervisor/capsule_writer.h"
+#include "crate/supervisor/child_process.h"
 #include "crate/supervisor/control_server.h"
 #include "crate/supervisor/crate_state.h"
 #include "crate/supervisor/log_follower.h"
@@ -50,6 +52,7 @@ class Supervisor {
   struct Member {  // a service with what the supervisor holds for it
     explicit Member(ProcessPlan plan) : service(std::move(plan)) {}
     Service service;
+    std::optional<ChildProcess> child;  // until its program is executed
     bool isAdopted = false;  // its process is not a child
     FileDescriptor adopted;  // pidfd of that process, if it could be opened
     bool isNotified = false;  // it has reported that it is ready
@@ -64,6 +67,8 @@ class Supervisor {
   void onStopSignal(int number);
   void act();
   void start(Member& member);
+  void failStart(Member& member, const std::string& why);
+  void takeStart(Member& member);  // whether its program is executed
   void signal(Member& member, int number);
   void handleSignals();
   void reapChildren();

@@ -2,6 +2,7 @@
 // ChildProcess: the gate before the program, its environment, and starts that fail.
 #include "crate/supervisor/child_process.h"
 
+#include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -36,6 +37,13 @@ class ChildProcessTest : public testing::Test {
     checkCall(::waitpid(pid, &status, 0), "waitpid");
     return status;
   }
+  // Lets the program run, and waits until it is known whether it does.
+  static std::string resultOf(ChildProcess& child) {
+    child.open();
+    pollfd poll{child.descriptor(), POLLIN, 0};
+    checkCall(::poll(&poll, 1, -1), "poll");
+    return child.tryResult().value();
+  }
   mpf::test::TemporaryFolder folder_;
   std::string log_ = folder_.file("child.log");
 };
@@ -46,7 +54,7 @@ TEST_F(ChildProcessTest, RunsInItsFolderWithItsEnvironment) {
   ChildProcess child(plan, log_);
   EXPECT_EQ(child.startTicks(), startTicksOf(child.pid()));
 
-  EXPECT_EQ(child.open(), "");
+  EXPECT_EQ(resultOf(child), "");
 
   EXPECT_EQ(WEXITSTATUS(wait(child.pid())), 3);
   EXPECT_EQ(readWholeFile(log_),
@@ -67,12 +75,12 @@ TEST_F(ChildProcessTest, SaysWhyAProgramCannotBeExecuted) {
   auto plan = planOf("");
   plan.command = {folder_.file("absent")};
   ChildProcess absent(plan, log_);
-  EXPECT_EQ(absent.open(), "No such file or directory");
+  EXPECT_EQ(resultOf(absent), "No such file or directory");
   EXPECT_EQ(WEXITSTATUS(wait(absent.pid())), 127);
 
   plan.command = {folder_.write("text", "no program")};
   ChildProcess text(plan, log_);
-  EXPECT_EQ(text.open(), "Permission denied");
+  EXPECT_EQ(resultOf(text), "Permission denied");
   wait(text.pid());
 
   plan.user = "no-such-user";
@@ -83,7 +91,7 @@ TEST_F(ChildProcessTest, SaysWhyAProgramCannotBeExecuted) {
 TEST_F(ChildProcessTest, AppendsToItsLog) {
   for (const std::string word : {"one", "two"}) {
     ChildProcess child(planOf("echo " + word), log_);
-    EXPECT_EQ(child.open(), "");
+    EXPECT_EQ(resultOf(child), "");
     wait(child.pid());
   }
   EXPECT_EQ(readWholeFile(log_), "one\ntwo\n");

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Supervisor: processes whose servers stall, or work on one request for ever.
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <mpf/file_descriptor.h>
+
 #include "tests/crate/supervisor/supervisor_fixture.h"
 
 // NOLINTBEGIN(modernize-raw-string-literal): a crate is one line
@@ -15,6 +20,20 @@ std::string hangingServer(const std::string& backplane) {
       "[[program]]\nname = \"one\"\ncommand = [\"{}\", \"{}\"]\n"
       "servers = [\"victim\"]\n",
       MPF_TEST_CRASHING_SERVER, backplane);
+}
+
+// Its folder is on a host that does not answer, for example.
+TEST_F(SupervisorTest, AnswersWhileAProcessWaitsBeforeItsProgramIsExecuted) {
+  const auto held = files_.file("held");
+  ASSERT_EQ(::mkfifo(held.c_str(), 0600), 0);
+  write(kServer);
+  start({"/usr/bin/env", "MPF_TEST_HELD=" + held, "LD_PRELOAD=" MPF_TEST_HELD_START, MPF, "run",
+         files_.file("lab.toml")});
+
+  EXPECT_EQ(stateOf("int32"), "starting");
+
+  const FileDescriptor opened(::open(held.c_str(), O_WRONLY | O_CLOEXEC));
+  waitForState("int32", "ready");
 }
 
 TEST_F(SupervisorTest, RestartsAServerThatIsStalled) {
