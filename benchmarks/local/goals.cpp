@@ -19,9 +19,12 @@ std::string goals(const std::vector<Result>& results) {
     goals.atMost("Int32 round trip in one thread [ns], at most", row->costNs(), 40);
   if (const auto* row = goals.find("One way", kMpf, Mode::spin))
     goals.atLeast("Int32 one way, million a second, at least", row->figures.perSecond / 1e6, 60);
-  if (const auto* row = goals.find("One way", mpfBatchPeer(true).name, Mode::spin))
+  const auto* batches = goals.find("One way", mpfBatchPeer(true).name, Mode::spin);
+  if (batches != nullptr)
     goals.atLeast("Int32 one way, values taken in batches, million a second, at least",
-                  row->figures.perSecond / 1e6, 60);
+                  batches->figures.perSecond / 1e6, 60);
+  goals.atMost("Int32 one way in batches, x the bare slot ring, at most",
+               goals.ratioToFloor(batches), 3);
   if (const auto* row = goals.find("One way", kMpf, Mode::adaptive))
     goals.atLeast("Int32 one way, adaptive, million a second, at least",
                   row->figures.perSecond / 1e6, 30);
