@@ -58,7 +58,7 @@ void addUse(json& process) {
 
 // What the supervisor calls ready may be stalled or busy.
 std::string stateOf(const json& process) {
-  const std::string state = process.at("state");
+  std::string state = process.at("state");
   if (state != "ready") return state;
   if (process.value("is_stalled", false)) return "stalled";
   return process.contains("handling") ? "busy" : state;
