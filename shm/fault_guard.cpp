@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "base/system_call.h"
+#include "shm/reserve.h"
 
 #ifdef __SANITIZE_THREAD__
 extern "C" {
@@ -65,9 +66,9 @@ Range* findFaulty(std::uintptr_t address) noexcept {
 }
 
 bool tryGrow(const Range& range) noexcept {
-  const auto bytes = static_cast<off_t>(range.bytes.load(std::memory_order_relaxed));
+  const auto bytes = range.bytes.load(std::memory_order_relaxed);
   if (const int file = range.file.load(std::memory_order_relaxed); file >= 0)
-    return ::fallocate(file, 0, 0, bytes) == 0;
+    return reserve(file, bytes) == 0;
   // PAIR(guard-path): also sees the path.
   const auto inode = range.inode.load(std::memory_order_acquire);
   if (inode == 0) return false;
@@ -75,7 +76,7 @@ bool tryGrow(const Range& range) noexcept {
   if (file < 0) return false;
   struct stat status{};
   const bool grown =
-      ::fstat(file, &status) == 0 && status.st_ino == inode && ::fallocate(file, 0, 0, bytes) == 0;
+      ::fstat(file, &status) == 0 && status.st_ino == inode && reserve(file, bytes) == 0;
   ::close(file);
   return grown;
 }

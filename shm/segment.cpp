@@ -20,27 +20,13 @@
 #include "base/system_call.h"
 #include "shm/owner_lock.h"
 #include "shm/process.h"
+#include "shm/reserve.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
 namespace {
 
 constexpr const char* kDirectory = "/dev/shm";
-
-// Older kernels abort and undo a long reservation when a signal arrives. Small pieces complete
-// between two ticks of a timer.
-int reserve(int fd, std::size_t bytes) {
-  constexpr std::size_t kPiece = std::size_t{1} << 20;
-  int shortage = ::posix_fallocate(fd, 0, static_cast<off_t>(bytes));
-  if (shortage != EINTR) return shortage;
-  for (std::size_t at = 0; at < bytes;) {
-    shortage = ::posix_fallocate(fd, static_cast<off_t>(at),
-                                 static_cast<off_t>(std::min(kPiece, bytes - at)));
-    if (shortage != 0 && shortage != EINTR) return shortage;
-    if (shortage == 0) at += kPiece;
-  }
-  return 0;
-}
 
 // Any user may create any kind of file in /dev/shm. With O_NONBLOCK, open() does not wait if the
 // file is a FIFO.

@@ -2,11 +2,14 @@
 // The memory of a segment is reserved when the segment is created. This file replaces
 // posix_fallocate(), so that a test chooses the kernel's answer.
 #include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <functional>
 
 #include "shm/pool.h"
+#include "shm/window.h"
 #include "tests/shm/shm_fixture.h"
 
 namespace {
@@ -53,6 +56,25 @@ TEST_F(Reserve, RetriesAfterSignals) {
 
   EXPECT_EQ(segment.bytes(), kBytes);
   EXPECT_EQ(calls, 12);
+}
+
+// The repair of a truncated file runs in a signal handler, where timers tick, too.
+TEST_F(Reserve, RetriesToGrowATruncatedFileAfterSignals) {
+  const OwnWindow window(name(), layout::SegmentKind::serverWindow,
+                         SegmentName::serverWindow(name(), 0, "s"), Rights{},
+                         [](layout::SegmentHeader&) {});
+  const auto path =
+      segments::path(SegmentName::keyed(name(), NameKind::hints, window.header().incarnation));
+  ASSERT_EQ(::truncate(path.c_str(), 0), 0);
+  int calls = 0;
+  answer = [&](off_t) { return ++calls <= 2 ? EINTR : 0; };
+
+  window.hints().bell.store(7, std::memory_order_relaxed);
+
+  struct stat status{};
+  ASSERT_EQ(::stat(path.c_str(), &status), 0);
+  EXPECT_GT(status.st_size, 0);
+  EXPECT_EQ(calls, 3);
 }
 
 TEST_F(Reserve, ReportsAShortageAfterSignals) {
