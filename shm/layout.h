@@ -288,6 +288,7 @@ struct ReturnRing {
   std::array<Word32, kReturnSlots> chunks;
 };
 inline constexpr std::uint32_t kMaxChunks = 1u << 16;  // of one bulk segment
+inline constexpr std::uint32_t kMaxBulks = 8192;  // bulk segments of one side of a link
 // In ReturnRing::chunks: a chunk of the fan-out pool.
 inline constexpr std::uint32_t kReturnsFanOut = 1u << 31;
 

@@ -213,7 +213,7 @@ layout::LinkState Link::peerState() const noexcept {
 }
 
 bool Link::tryLeavePoolToClient() noexcept {
-  if (pool_.bytes() == 0) return true;
+  if (!pool_.hasSegments()) return true;
   const auto client = peer_->user();
   leavesPool_ = client == ::geteuid() || client == 0;
   return leavesPool_;

@@ -12,7 +12,6 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kMaxBulks = 256;  // bulk segments of one side of a link
 constexpr std::size_t kMaxChunkBytes = UINT32_MAX;  // the largest value of Slot::bodyBytes
 
 // A power of two for the elements, plus room for the header of a message: 1 MiB of data then does
@@ -55,7 +54,7 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
       MPF_STEP(chunk_claimed);
       return Chunk{bulk.chunk(index), chunkBytes};
     }
-    if (!addBulk(chunkBytes)) break;
+    if (!tryGrow(chunkBytes)) break;
   }
   return std::nullopt;
 }
@@ -64,10 +63,62 @@ bool PoolOwner::isWithinLimit(std::size_t bytes) const noexcept {
   return bytes <= kMaxChunkBytes && layout::kBulkChunksOffset + chunkBytesFor(bytes) <= maxBytes_;
 }
 
-bool PoolOwner::addBulk(std::size_t chunkBytes) try {
-  const auto room = maxBytes_ - bytes_;  // the last segment of a pool may be smaller
-  if (bulks_.size() >= kMaxBulks || room < layout::kBulkChunksOffset + chunkBytes) return false;
-  const auto fitting = (room - layout::kBulkChunksOffset) / chunkBytes;
+void PoolOwner::Bulk::freeAll() noexcept {
+  for (auto index = static_cast<std::uint32_t>(states.size()); index-- > 0;) free.push_back(index);
+}
+
+// Not a member of its own: the path of a message multiplies by the size of a Bulk.
+bool PoolOwner::Bulk::isReleased() const noexcept {
+  return free.empty() &&
+         std::ranges::all_of(states, [](ChunkState state) { return state == ChunkState::free; });
+}
+
+bool PoolOwner::tryGrow(std::size_t chunkBytes) noexcept {
+  const auto least = layout::kBulkChunksOffset + chunkBytes;
+  const auto tryAdd = [&] { return tryReserveReleased(chunkBytes) || addBulk(chunkBytes); };
+  if (!tryMakeRoom(least)) return false;
+  if (tryAdd()) return true;
+  // /dev/shm may be full.
+  bool hasReleased = false;
+  for (auto& bulk : bulks_) hasReleased |= tryRelease(bulk);
+  return hasReleased && tryAdd();
+}
+
+// Releases segments without a chunk in use until there is room for `bytes`; none if all of them
+// would not be enough, because a sender that has to wait may try this often.
+bool PoolOwner::tryMakeRoom(std::uint64_t bytes) noexcept {
+  auto possible = room();
+  for (const auto& bulk : bulks_) possible += bulk.isIdle() ? bulk.segment.bytes() : 0;
+  if (possible < bytes) return false;
+  for (auto& bulk : std::views::reverse(bulks_)) {
+    if (room() >= bytes) break;
+    tryRelease(bulk);
+  }
+  return room() >= bytes;
+}
+
+bool PoolOwner::tryRelease(Bulk& bulk) noexcept {
+  if (!bulk.isIdle() || !bulk.segment.tryRelease(layout::kBulkChunksOffset)) return false;
+  bulk.free.clear();
+  bytes_ -= bulk.segment.bytes();
+  return true;
+}
+
+bool PoolOwner::tryReserveReleased(std::size_t chunkBytes) noexcept {
+  for (auto& bulk : bulks_) {
+    if (!bulk.isReleased() || bulk.chunkSize.bytes() != chunkBytes) continue;
+    if (bulk.segment.bytes() > room() || !bulk.segment.tryReserve()) continue;
+    bulk.freeAll();
+    bytes_ += bulk.segment.bytes();
+    return true;
+  }
+  return false;
+}
+
+bool PoolOwner::addBulk(std::size_t chunkBytes) noexcept try {
+  if (bulks_.size() >= layout::kMaxBulks) return false;
+  // A segment may be smaller than usual if there is room for some chunks only.
+  const auto fitting = (room() - layout::kBulkChunksOffset) / chunkBytes;
   const auto count =
       static_cast<std::uint32_t>(std::min<std::uint64_t>(chunkCountFor(chunkBytes), fitting));
   const auto bytes = layout::kBulkChunksOffset + count * chunkBytes;
@@ -83,7 +134,8 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
             ChunkSize(chunkBytes),
             std::vector<ChunkState>(count, ChunkState::free),
             {}};
-  for (auto index = count; index-- > 0;) bulk.free.push_back(index);
+  bulk.free.reserve(count);
+  bulk.freeAll();
   bulks_.reserve(bulks_.size() + 1);
   // Last, because nothing may fail after the file has its name: no other segment could have it.
   if (!bulk.segment.tryPublish(name)) return false;
@@ -114,18 +166,21 @@ void PoolOwner::collectReturned() noexcept {
 }
 
 bool PoolBorrower::tryMap(std::uint32_t number) try {
-  if (number >= kMaxBulks) return false;
-  if (number >= bulks_.size()) bulks_.resize(number + 1);
+  // The peer has released segments of other sizes: they count for its limit no longer, but stay
+  // mapped.
+  constexpr std::uint64_t kMaxSizes = 32;
+  if (number >= layout::kMaxBulks || bytes_ / kMaxSizes >= maxBytes_) return false;
   auto segment =
       Segment::tryOpen(SegmentName::bulk(place_.backplane, place_.link, place_.side, number),
                        layout::SegmentKind::bulk, Segment::Access::readWrite);
-  if (!segment || segment->bytes() > maxBytes_ - bytes_) return false;
+  if (!segment || segment->bytes() > maxBytes_) return false;
   const auto header = segment->header();
   const auto room =
       segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
   if (header.chunkBytes == 0 || header.chunkBytes % layout::kCacheLineBytes != 0) return false;
   if (header.chunkCount > room / header.chunkBytes || header.chunkCount > layout::kMaxChunks)
     return false;
+  if (number >= bulks_.size()) bulks_.resize(number + 1);
   segment->closeFile();
   bytes_ += segment->bytes();
   bulks_[number] = {std::move(*segment), ChunkSize(header.chunkBytes), header.chunkCount};

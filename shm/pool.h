@@ -6,7 +6,12 @@
 //   borrower  read in place ─► return the chunk (ReturnRing), or send it back in a reply
 //
 // A bulk segment contains chunks of one size: a power of two plus room for a header. It is created
-// when it is first needed, so a link that sends only small messages uses no memory here.
+// when it is first needed, so a link that sends only small messages uses no memory here. When the
+// limit or /dev/shm leaves no room, segments without a chunk in use give their memory back:
+//
+//   reserved ─► released: the memory of its chunks is a hole in the file ─► reserved
+//
+// The file, its name and its mappings stay, so a number never refers to another segment.
 //
 // Threads  the caller serialises all functions; Link does.
 // Crash    bulk segments belong to their link, and are removed with it.
@@ -120,7 +125,9 @@ class PoolOwner {
       const std::byte* data) const noexcept {
     return tryFindIn(bulks_, data);
   }
-  // Memory of all segments of this pool.
+  // Whether a segment was created, and so has a name, even if its memory was released.
+  [[nodiscard]] bool hasSegments() const noexcept { return !bulks_.empty(); }
+  // Memory of the segments of this pool that are not released.
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
   // Takes what the peer has returned through the ring.
   void collectReturned() noexcept;
@@ -139,12 +146,20 @@ class PoolOwner {
     Segment segment;
     ChunkSize chunkSize;
     std::vector<ChunkState> states;
-    std::vector<std::uint32_t> free;
+    std::vector<std::uint32_t> free;  // empty while released
+    void freeAll() noexcept;  // `free` has reserved memory for all chunks
+    [[nodiscard]] bool isIdle() const noexcept { return free.size() == states.size(); }
+    [[nodiscard]] bool isReleased() const noexcept;
     [[nodiscard]] std::byte* chunk(std::uint32_t index) const {
       return segment.data() + layout::kBulkChunksOffset + index * chunkSize.bytes();
     }
   };
-  bool addBulk(std::size_t chunkBytes);
+  bool tryGrow(std::size_t chunkBytes) noexcept;
+  bool addBulk(std::size_t chunkBytes) noexcept;
+  bool tryReserveReleased(std::size_t chunkBytes) noexcept;
+  bool tryMakeRoom(std::uint64_t bytes) noexcept;
+  bool tryRelease(Bulk& bulk) noexcept;
+  [[nodiscard]] std::uint64_t room() const noexcept { return maxBytes_ - bytes_; }
   [[nodiscard]] bool isLent(ChunkPlace place) const noexcept {
     return place.segment < bulks_.size() && place.chunk < bulks_[place.segment].states.size() &&
            bulks_[place.segment].states[place.chunk] == ChunkState::lent;
@@ -154,7 +169,7 @@ class PoolOwner {
   PoolPlace place_;
   Rights rights_;
   std::uint64_t maxBytes_;
-  std::uint64_t bytes_ = 0;
+  std::uint64_t bytes_ = 0;  // of segments that are not released
   layout::ReturnRing* returns_;
   std::uint64_t collected_ = 0;
   bool leavesNames_ = false;
@@ -203,8 +218,8 @@ class PoolBorrower {
   bool tryMap(std::uint32_t number);
   void returnPacked(std::uint32_t packed) noexcept;
   PoolPlace place_;
-  std::uint64_t maxBytes_;  // most memory that the peer can make us map
-  std::uint64_t bytes_ = 0;
+  std::uint64_t maxBytes_;  // of one segment
+  std::uint64_t bytes_ = 0;  // mapped; some of it may be released
   layout::ReturnRing* returns_;
   std::uint64_t returned_ = 0;
   std::vector<Bulk> bulks_;  // index = segment number; empty where not mapped

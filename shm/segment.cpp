@@ -167,14 +167,26 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, std::string
   return segment;
 }
 
-bool Segment::tryReserve() const noexcept try {
-  const auto file = openByName(name_, O_RDWR);
+FileDescriptor Segment::reopen() const noexcept try {
+  auto file = openByName(name_, O_RDWR);
   std::uint64_t found = 0;
   const auto got =
       ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
-  return got == sizeof found && found == header_.incarnation && reserve(file.get(), bytes()) == 0;
+  if (got != sizeof found || found != header_.incarnation) return {};
+  return file;
 } catch (const std::bad_alloc&) {
-  return false;
+  return {};
+}
+
+bool Segment::tryReserve() const noexcept {
+  const auto file = reopen();
+  return file && reserve(file.get(), bytes()) == 0;
+}
+
+bool Segment::tryRelease(std::size_t from) const noexcept {
+  const auto file = reopen();
+  return file && ::fallocate(file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE,
+                             static_cast<off_t>(from), static_cast<off_t>(bytes() - from)) == 0;
 }
 
 void Segment::lockForLife() {

@@ -60,6 +60,10 @@ class Segment {
   // Gives all bytes memory. Opens the file by its name. Returns false if /dev/shm does not have
   // enough free memory, the process has no file descriptor left, or the name was removed.
   [[nodiscard]] bool tryReserve() const noexcept;
+  // Gives the memory from offset `from` on back to the system. The length of the file and all
+  // mappings stay; the bytes must not be accessed before tryReserve(). Returns false if the file
+  // cannot be opened by its name.
+  [[nodiscard]] bool tryRelease(std::size_t from) const noexcept;
 
   // Holds the owner's lock until this object is destroyed or the process ends. If a peer truncates
   // the file, the guard grows it again.
@@ -114,6 +118,9 @@ class Segment {
   void closeFile() { file_.reset(); }
 
  private:
+  // Opens the file again for writing; empty if the name refers to no file, or to another one.
+  [[nodiscard]] FileDescriptor reopen() const noexcept;
+
   FileDescriptor file_;
   Mapping mapping_;
   layout::SegmentHeader header_{};

@@ -97,5 +97,35 @@ TEST_F(Reserve, AllocatesNoChunkDuringAShortageAndOneAfterIt) {
   EXPECT_TRUE(pool.tryAlloc(1000));
 }
 
+// The kernel has no room for another segment before the pool has released its first one.
+TEST_F(Reserve, AShortageReleasesTheSegmentsWithoutAChunkInUse) {
+  layout::ReturnRing returns{};
+  PoolOwner pool({name(), 1, 0, 0}, Rights{}, 1 << 20, returns);
+  pool.free(pool.tryFind(pool.tryAlloc(1000).value().data).value());
+  const auto path = segments::path(SegmentName::bulk(name(), 1, 0, 0));
+  answer = [path](off_t) {
+    struct stat status{};
+    const bool isReleased = ::stat(path.c_str(), &status) == 0 &&
+                            status.st_blocks * 512 == static_cast<off_t>(layout::kPageBytes);
+    return isReleased ? 0 : ENOSPC;
+  };
+
+  EXPECT_TRUE(pool.tryAlloc(100'000));
+}
+
+TEST_F(Reserve, AReleasedSegmentIsNotUsedDuringAShortage) {
+  constexpr std::uint64_t kLimit = 300'000;
+  layout::ReturnRing returns{};
+  PoolOwner pool({name(), 1, 0, 0}, Rights{}, kLimit, returns);
+  for (const std::size_t bytes : {100'000, 200'000})
+    pool.free(pool.tryFind(pool.tryAlloc(bytes).value().data).value());
+  answer = [](off_t) { return ENOSPC; };
+
+  EXPECT_FALSE(pool.tryAlloc(100'000));
+
+  answer = [](off_t) { return 0; };
+  EXPECT_TRUE(pool.tryAlloc(100'000));
+}
+
 }  // namespace
 }  // namespace mpf::test

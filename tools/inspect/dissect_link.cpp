@@ -23,7 +23,6 @@ namespace {
 
 using layout::SegmentHeader;
 
-constexpr std::uint32_t kMostBulks = 256;  // of one side; a pool never has more
 constexpr std::size_t kMostBody = std::size_t{16} << 20;  // larger bodies are not shown
 
 template <class Word>
@@ -141,7 +140,7 @@ Tree dissectRing(const RingPlace& place, const Beside& beside, const DissectOpti
 Tree dissectPool(std::uint32_t side, const layout::ReturnRing& returns, const Beside& beside) {
   Tree tree{{"returned", said(returns.returned)}};
   auto segments = Tree::array();
-  for (std::uint32_t number = 0; number < kMostBulks; ++number) {
+  for (std::uint32_t number = 0; number < layout::kMaxBulks; ++number) {
     const auto path = beside.bulk(side, number);
     try {
       const auto image = SegmentImage::tryReadFile(path);
