@@ -36,7 +36,8 @@ Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
 
 Dispatcher::Impl::~Impl() {
   if (endpoint().forkGuard().isInherited()) return;
-  endpoint().control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+  // PAIR(window-closed): the messages that were sent before.
+  endpoint().control().state.store(layout::WindowState::closed, std::memory_order_release);
 }
 
 void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {

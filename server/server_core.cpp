@@ -70,7 +70,9 @@ ServerCore::~ServerCore() {
 }
 
 Connections::Channels ServerCore::closeAll() noexcept {
-  endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+  // Before the links, so that no client makes another link meanwhile.
+  // PAIR(window-closed): the messages that were sent before.
+  endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_release);
   connections_.onClient(nullptr);
   return connections_.closeAll();
 }

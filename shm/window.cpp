@@ -167,7 +167,7 @@ void OwnWindow::publish(const std::string& name) {
 
 OwnWindow::~OwnWindow() {
   if (forkGuard_.isInherited()) return;
-  // PAIR(window-closed): the owner has closed its links before.
+  // PAIR(window-closed): the owner has sent its messages and closed its links before.
   control().state.store(layout::WindowState::closed, std::memory_order_release);
   MPF_STEP(window_closed);
   segments::remove(fifoName_);

@@ -124,7 +124,8 @@ class PeerWindow {
   [[nodiscard]] const FileDescriptor& process() const noexcept { return process_; }
   [[nodiscard]] std::uint32_t user() const noexcept { return window_.fileUser(); }
   [[nodiscard]] bool isClosed() const noexcept {
-    // PAIR(window-closed): also sees that the owner has closed its links.
+    // PAIR(window-closed): also sees the messages that the owner sent before. Its links may still
+    // be open.
     return control().state.load(std::memory_order_acquire) == layout::WindowState::closed;
   }
 
