@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <mutex>
 #include <spdlog/logger.h>
 #include <thread>
@@ -83,7 +84,7 @@ class ServerLog::Writer {
       } else if (dueNs_ <= Clock::nowNs()) {
         dueNs_ = INT64_MAX;
         guard.unlock();
-        const auto nextNs = log.writeDue();
+        const auto nextNs = tryWriteDue(log);
         guard.lock();
         dueNs_ = std::min(dueNs_, nextNs);
       } else if (dueNs_ == INT64_MAX) {
@@ -94,14 +95,23 @@ class ServerLog::Writer {
     }
   }
 
+  // Without memory, some lines may be lost; those that are still held follow later.
+  static std::int64_t tryWriteDue(const Log& log) noexcept try {
+    return log.writeDue();
+  } catch (const std::exception&) {
+    return Deadline::after(std::chrono::seconds(1)).ns();
+  }
+
+  // Needs no memory: the two queues take turns.
   void writeQueue(std::unique_lock<std::mutex>& guard) {
-    const auto lines = std::exchange(queue_, {});
+    written_.swap(queue_);
     const auto dropped = std::exchange(dropped_, 0);
     guard.unlock();
     if (dropped != 0)
       logger_.warn("{} lines are missing here: stderr was not read in time", dropped);
-    for (const auto& line : lines)
+    for (const auto& line : written_)
       logger_.log(line.time, spdlog::source_loc{}, line.level, line.text);
+    written_.clear();
     guard.lock();
   }
 
@@ -109,6 +119,7 @@ class ServerLog::Writer {
   std::mutex lock_;
   std::condition_variable changed_;
   std::deque<Line> queue_;
+  std::deque<Line> written_;  // of the thread; empty unless it writes
   std::uint64_t dropped_ = 0;
   std::int64_t dueNs_ = INT64_MAX;  // when the limit has lines to write
   bool ends_ = false;
@@ -126,7 +137,11 @@ ServerLog::ServerLog(const std::string& program, const std::string& level)
 }
 
 ServerLog::~ServerLog() {
-  log_.writeHeld();
+  try {
+    log_.writeHeld();
+    // NOLINTNEXTLINE(bugprone-empty-catch): no memory: the lines are lost, the program ends in order
+  } catch (const std::exception&) {
+  }
   writer_->finish();
 }
 

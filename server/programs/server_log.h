@@ -7,7 +7,8 @@
 //
 // Threads  any thread may log, and no thread waits for stderr. When stderr is not read, the queue
 //          drops its oldest lines, and a line reports their number.
-// Crash    lines in the queue, and lines that the limit holds back, are lost.
+// Crash    lines in the queue, and lines that the limit holds back, are lost. Without memory, lines
+//          may be lost, too; the program continues.
 #pragma once
 
 #include <memory>
