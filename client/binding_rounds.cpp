@@ -2,6 +2,7 @@
 #include "client/binding_rounds.h"
 
 #include <algorithm>
+#include <exception>
 
 namespace mpf {
 
@@ -106,10 +107,18 @@ void BindingRounds::resumeWaiting() {
   if (!waiting_.isOver()) return;
   if (std::ranges::any_of(bindings_,
                           [](const auto& each) { return each.second.binding->isWaiting(); })) {
-    parts_.names.start();
+    tryWatchNames();
   } else {
     parts_.names.stop();
   }
+}
+
+// Each attempt to connect starts the watch, too: if that failed, notConnectedBecause() returns the
+// reason, and the timer of the binding repeats the attempt.
+void BindingRounds::tryWatchNames() noexcept try {
+  parts_.names.start();
+  // NOLINTNEXTLINE(bugprone-empty-catch): see above
+} catch (const std::exception&) {
 }
 
 void BindingRounds::handleDue() {

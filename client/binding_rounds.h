@@ -61,6 +61,7 @@ class BindingRounds {
   void resumeRounds();
   void resumeDead();
   void resumeWaiting();
+  void tryWatchNames() noexcept;
 
   DispatcherParts& parts_;
   Members bindings_;

@@ -157,6 +157,22 @@ TEST_F(BindingRoundsTest, WatchNamesWhileABindingWaitsForItsServer) {
   EXPECT_FALSE(parts_.names.isRunning());
 }
 
+TEST_F(BindingRoundsTest, AWatchThatCannotStartIsStartedByTheNextAttemptToConnect) {
+  const auto binding = add();
+  rounds_.noteName();
+  {
+    const LimitedMemory limit(1);  // for the round
+    EXPECT_TRUE(rounds_.resume());
+  }
+  EXPECT_FALSE(parts_.names.isRunning());
+  EXPECT_NE(binding->notConnectedBecause(), "");
+  ASSERT_NE(binding->dueNs(), INT64_MAX);
+
+  binding->onTime(binding->dueNs());
+
+  EXPECT_TRUE(parts_.names.isRunning());
+}
+
 TEST_F(BindingRoundsTest, EndTheWatchAfterTheLastWaitingBindingIsRemoved) {
   addUnbound();
   const auto binding = add();
