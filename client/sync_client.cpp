@@ -7,6 +7,7 @@
 
 #include "base/duration_text.h"
 #include "base/printable.h"
+#include "shm/layout.h"
 
 namespace mpf {
 namespace {
@@ -15,6 +16,11 @@ namespace {
 constexpr int kStepsToDeadlines = 64;
 
 constexpr std::size_t kShownCharacters = 500;
+
+// Whether the body does not fit into a ring: it may keep a chunk of the server's pool.
+bool isLong(const Message& message) noexcept {
+  return message.body().size() > layout::kInlineBodyBytes;
+}
 
 // The words of a server that could not do what was asked, such as one in Python.
 std::string wordsOf(const Message& reply) {
@@ -58,8 +64,22 @@ void SyncClient::take(Message&& message) {
     }
   } else if (message.getType() != MessageType::connect &&
              message.getType() != MessageType::requestFate) {
-    others_.push_back(std::move(message));
+    store(std::move(message));
   }
+}
+
+void SyncClient::store(Message&& message) {
+  const bool isLongOne = isLong(message);
+  others_.push_back(std::move(message));
+  if (isLongOne) ++longOthers_;
+  for (; others_.size() > kMaxStored || longOthers_ > kMaxStoredLong; ++dropped_) takeStored();
+}
+
+Message SyncClient::takeStored() noexcept {
+  auto message = std::move(others_.front());
+  others_.pop_front();
+  if (isLong(message)) --longOthers_;
+  return message;
 }
 
 // The calling thread runs the dispatcher, even when another thread ran it last.
@@ -123,10 +143,7 @@ Message SyncClient::receive(Nanoseconds timeout) {
   // Runs the dispatcher at least once: with a timeout of 0, it returns a message that has arrived.
   for (bool isFirst = true; others_.empty() && (isFirst || !deadline.hasPassed()); isFirst = false)
     dispatcher_.runOnce(deadline);
-  if (others_.empty()) return {};
-  auto message = std::move(others_.front());
-  others_.pop_front();
-  return message;
+  return others_.empty() ? Message() : takeStored();
 }
 
 }  // namespace mpf

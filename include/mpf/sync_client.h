@@ -14,6 +14,8 @@
 // Source   an addition: clients of the manual ("Message Client") receive replies in callbacks only.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
@@ -81,8 +83,14 @@ class SyncClient {
   Answer call(Message&& message, Nanoseconds timeout, Retry retry = Retry::never);
   // Waits for a message that is not the first reply to a call: a further reply, for example of a
   // subscription, or an OutOfBand message. call() stores such messages until receive() returns
-  // them, in their order. Returns an empty handle after `timeout`.
+  // them, in their order: at most kMaxStored of them, and kMaxStoredLong with a body of more than
+  // 192 bytes, which stays in the memory that the server has for this client. It drops the oldest
+  // ones above these limits. Returns an empty handle after `timeout`.
   Message receive(Nanoseconds timeout);
+  static constexpr std::size_t kMaxStored = 16384;
+  static constexpr std::size_t kMaxStoredLong = 64;
+  // Number of messages that were dropped since the client was created.
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
   // Waits until the client is connected; returns false after `timeout`.
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
@@ -92,12 +100,16 @@ class SyncClient {
  private:
   SendResult send(Message&& message, Deadline deadline, Retry retry);
   void take(Message&& message);
+  void store(Message&& message);
+  Message takeStored() noexcept;
   [[nodiscard]] std::string detailsOf(SendResult refusal, const Message& notSent) const;
   Dispatcher dispatcher_;
   MessageClient client_;
   std::uint32_t awaited_ = 0;
   std::optional<Answer> answer_;
   std::deque<Message> others_;
+  std::size_t longOthers_ = 0;  // of others_, those with a long body
+  std::uint64_t dropped_ = 0;
 };
 
 }  // namespace mpf

@@ -52,6 +52,38 @@ TEST(SyncClientTest, ReturnsMessagesThatHaveArrivedWithoutWaiting) {
   EXPECT_FALSE(subscription.client.receive(0s));
 }
 
+// The client calls another request, and never receive().
+TEST(SyncClientTest, DropsTheOldestOfTooManyStoredMessages) {
+  constexpr std::int32_t kMore = 10;
+  Subscription subscription;
+  auto& [backplane, server, held, client] = subscription;
+  const auto storeSome = [&](std::size_t most, const auto& make) {
+    constexpr std::size_t kBatch = 32;  // fits into the ring
+    for (std::size_t sent = 0; sent < most + kMore;) {
+      for (std::size_t i = 0; i < kBatch && sent < most + kMore; ++i, ++sent)
+        ASSERT_EQ(server.reply(make(static_cast<std::int32_t>(sent))), ReplyResult::sent);
+      EXPECT_FALSE(client.call(Int32Message(), 1ns));
+      EXPECT_FALSE(server.receive()) << "the request has expired";
+    }
+  };
+
+  storeSome(SyncClient::kMaxStored, [&](std::int32_t number) {
+    auto reply = server.allocReplyMessage<Int32>(held);
+    reply->value = number;
+    return reply;
+  });
+
+  EXPECT_EQ(client.dropped(), kMore);
+  const auto oldest = MessageOf<Int32>::tryFrom(client.receive(0s));
+  ASSERT_TRUE(oldest);
+  EXPECT_EQ((*oldest)->value, kMore);
+  while (client.receive(0s)) {
+  }
+  storeSome(SyncClient::kMaxStoredLong,
+            [&](std::int32_t) { return server.allocReplyMessage<Float64Array>(held, 1000); });
+  EXPECT_EQ(client.dropped(), 2 * kMore);
+}
+
 // A subscription whose client has used all ids since.
 TEST(SyncClientTest, AFurtherReplyWithTheIdOfARequestIsNoAnswer) {
   Subscription subscription;
