@@ -235,7 +235,7 @@ bool Endpoint::arm() noexcept {
   if (isPolled_) return true;
   doorbell::drainFifo(window_.fifo());
   announce(layout::SleepState::onDescriptor);
-  tryScanAllLinks();
+  tryScanAllLinks();  // if it is too early, the next arm() scans: the descriptor has no timer
   armed_ = true;
   polledLeft_ = 0;
   if (!hasEvents()) return true;

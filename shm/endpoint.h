@@ -13,7 +13,9 @@
 // Threads  one owner thread; interrupt() may be called by any thread and by a signal handler.
 // Crash    the watcher reports a peer's death as a local event: takeLocalEvent(), takePeerDeath().
 // Trust    a ready bit may be missing or set without reason: the endpoint looks at every link
-//          before a sleep, or, if it has many, every 100 ms.
+//          before a sleep, or, if it has many, every 100 ms. An event loop with many links looks at
+//          them only in an arm() 100 ms after the last look: a message whose bit a faulty peer has
+//          cleared may wait for the next event. Clients with unanswered requests cause one.
 #pragma once
 
 #include <algorithm>
