@@ -12,10 +12,16 @@ void addBackplane(CLI::App& app, std::string& backplane, const std::string& othe
 
 void addServer(CLI::App& app, ServerArguments& arguments) {
   addBackplane(app, arguments.backplane, "\"default\"");
-  arguments.location = Backplane::defaultLocation();
-  app.add_option("--location", arguments.location,
-                 "Location of the server; default: $MPF_LOCATION, or 0");
+  addLocation(app, arguments.location);
   app.add_option("server", arguments.server, "Name of the server")->required();
+}
+
+void addLocation(CLI::App& app, std::optional<std::int32_t>& location) {
+  app.add_option("--location", location, "Location of the server; default: $MPF_LOCATION, or 0");
+}
+
+std::int32_t chosenLocation(const std::optional<std::int32_t>& location) {
+  return location ? *location : Backplane::defaultLocation();
 }
 
 void addJson(CLI::App& app, bool& json) {

@@ -39,7 +39,7 @@ TEST_F(ToolArgumentsTest, AServerIsItsNameLocationAndBackplane) {
   EXPECT_EQ(errorOf(app, {"dac", "--location", "-3", "--backplane", "lab"}), "");
 
   EXPECT_EQ(arguments.server, "dac");
-  EXPECT_EQ(arguments.location, -3);
+  EXPECT_EQ(chosenLocation(arguments.location), -3);
   EXPECT_EQ(arguments.backplane, "lab");
 }
 
@@ -60,8 +60,21 @@ TEST_F(ToolArgumentsTest, DefaultsComeFromTheEnvironment) {
 
   EXPECT_EQ(errorOf(app, {"dac"}), "");
 
-  EXPECT_EQ(arguments.location, 4);
+  EXPECT_EQ(chosenLocation(arguments.location), 4);
   EXPECT_EQ(arguments.backplane, "lab");
+}
+
+// The other commands, and --help, do not use the variable.
+TEST_F(ToolArgumentsTest, AWrongLocationOfTheEnvironmentIsAnErrorOnlyWhereItIsUsed) {
+  ::setenv("MPF_LOCATION", "lab", 1);
+  ServerArguments arguments;
+  CLI::App app;
+  addServer(app, arguments);
+
+  EXPECT_EQ(errorOf(app, {"dac"}), "");
+  EXPECT_THROW(static_cast<void>(chosenLocation(arguments.location)), std::invalid_argument);
+  EXPECT_EQ(errorOf(app, {"dac", "--location", "2"}), "");
+  EXPECT_EQ(chosenLocation(arguments.location), 2);
 }
 
 TEST_F(ToolArgumentsTest, ABackplaneStaysEmptyUnlessTheUserNamesOne) {

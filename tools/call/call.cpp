@@ -62,7 +62,8 @@ class Caller {
   Caller(const CallArguments& arguments, MessageType type)
       : arguments_(arguments),
         type_(type),
-        client_(Backplane::attach(arguments.backplane), arguments.server, arguments.location) {
+        location_(chosenLocation(arguments.location)),
+        client_(Backplane::attach(arguments.backplane), arguments.server, location_) {
     // A loop prints statistics at its end, and so a signal only ends the loop, after the call that
     // is in progress. For a single call a signal ends the program.
     if (isLoop() || arguments_.follow > Nanoseconds(0)) {
@@ -118,7 +119,7 @@ class Caller {
     const auto why = answer.why();
     if (answer.refusal() != SendResult::notConnected) return why;
     const auto snapshot = Snapshot::take(Backplane::named(arguments_.backplane).name());
-    return why + connectionHint(snapshot, arguments_.server, arguments_.location) +
+    return why + connectionHint(snapshot, arguments_.server, location_) +
            "; `mpf ls` shows all servers";
   }
 
@@ -164,7 +165,7 @@ class Caller {
 
   void reportJson() {
     nlohmann::json report{{"server", arguments_.server},
-                          {"location", arguments_.location},
+                          {"location", location_},
                           {"replied", recorder_->count()},
                           {"failed", failed_},
                           {"why", reasons_},
@@ -178,6 +179,7 @@ class Caller {
 
   const CallArguments& arguments_;
   MessageType type_;
+  std::int32_t location_;
   SyncClient client_;
   std::atomic<bool> stopped_{false};
   std::optional<StopSignals> stop_;

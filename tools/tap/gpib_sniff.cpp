@@ -44,7 +44,7 @@ void addGpibSniff(CLI::App& app, Run& run) {
       return sniff({.command = "gpib-sniff",
                     .kind = "a GPIB server",
                     .backplane = arguments->backplane,
-                    .location = arguments->location,
+                    .location = chosenLocation(arguments->location),
                     .server = arguments->server,
                     .duration = arguments->duration},
                    std::make_unique<SniffTextOf<GpibSniffFormat>>(std::move(format)));

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include <mpf/message_client.h>
 
@@ -33,7 +34,7 @@ struct ReplayArguments {
   std::string file;
   std::string backplane;
   std::string server;
-  std::int32_t location = 0;
+  std::optional<std::int32_t> location;
   double speed = 1;  // 0: as fast as the server accepts them
   Nanoseconds timeout = std::chrono::seconds(10);
   bool json = false;
@@ -45,6 +46,7 @@ class Replayer {
  public:
   explicit Replayer(const ReplayArguments& arguments)
       : arguments_(arguments),
+        location_(chosenLocation(arguments.location)),
         dispatcher_(Backplane::attach(arguments.backplane)),
         stop_([](void* self) noexcept { static_cast<Replayer*>(self)->stop(); }, this) {}
 
@@ -98,7 +100,7 @@ class Replayer {
     if (client) return client.get();
     client =
         std::make_unique<MessageClient>(dispatcher_, [this](Message&& message) { count(message); });
-    client->bind(server_, arguments_.location);
+    client->bind(server_, location_);
     const auto limit = Deadline::after(arguments_.timeout);
     while (!client->isConnected() && !stopped_ && !limit.hasPassed()) dispatcher_.runOnce(limit);
     if (client->isConnected()) return client.get();
@@ -194,6 +196,7 @@ class Replayer {
   static constexpr ConversionLimits kNoLimit{.maxValueBytes = SIZE_MAX};
 
   const ReplayArguments& arguments_;
+  std::int32_t location_;
   std::string server_;
   std::atomic<bool> stopped_{false};
   Dispatcher dispatcher_;
@@ -219,9 +222,7 @@ void addReplay(CLI::App& app, Run& run) {
       "the recorded server did");
   auto arguments = std::make_shared<ReplayArguments>();
   addBackplane(command, arguments->backplane, "\"default\"");
-  arguments->location = Backplane::defaultLocation();
-  command.add_option("--location", arguments->location,
-                     "Location of the server; default: $MPF_LOCATION, or 0");
+  addLocation(command, arguments->location);
   command.add_option("file", arguments->file, "Recording that `mpf tap --write` wrote")
       ->required()
       ->check(CLI::ExistingFile);
@@ -245,7 +246,7 @@ void addReplay(CLI::App& app, Run& run) {
       return serveGhost({.file = arguments->file,
                          .backplane = arguments->backplane,
                          .server = arguments->server,
-                         .location = arguments->location,
+                         .location = chosenLocation(arguments->location),
                          .speed = arguments->speed,
                          .json = arguments->json});
     };

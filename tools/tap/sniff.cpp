@@ -41,7 +41,7 @@ void addSniff(CLI::App& app, Run& run) {
       return sniff({.command = "sniff",
                     .kind = "a serial server",
                     .backplane = arguments->backplane,
-                    .location = arguments->location,
+                    .location = chosenLocation(arguments->location),
                     .server = arguments->server,
                     .duration = arguments->duration},
                    std::make_unique<SniffTextOf<SniffFormat>>(std::move(format)));

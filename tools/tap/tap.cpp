@@ -58,15 +58,15 @@ int tap(const TapArguments& arguments) {
   const ReaderWatch reader([&stopped] { stopped = true; });
   const auto link = parseLink(arguments.link);
   const auto sink = sinkFor(arguments);
-  TapSession session(
-      {Backplane::named(arguments.backplane).name(), arguments.server, arguments.location, link,
-       arguments.count != 0 ? arguments.count : UINT64_MAX},
-      *sink);
+  const auto location = chosenLocation(arguments.location);
+  TapSession session({Backplane::named(arguments.backplane).name(), arguments.server, location,
+                      link, arguments.count != 0 ? arguments.count : UINT64_MAX},
+                     *sink);
   if (session.isServerThere()) {
     printError("mpf tap: \"{}\" has {} now\n", arguments.server, counted(session.links(), "link"));
   } else {
     printError("mpf tap: server \"{}\" at location {} is absent; waiting for it\n",
-               arguments.server, arguments.location);
+               arguments.server, location);
   }
 
   const auto end =
