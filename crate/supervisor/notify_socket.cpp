@@ -28,8 +28,9 @@ NotifySocket::NotifySocket()
   name_ = "@" + std::string(address.sun_path + 1, length - offsetof(sockaddr_un, sun_path) - 1);
 }
 
-std::optional<pid_t> NotifySocket::takeReady() const {
-  for (;;) {
+std::vector<pid_t> NotifySocket::takeReady() const {
+  std::vector<pid_t> ready;
+  for (std::size_t i = 0; i < kMaxReports; ++i) {
     std::array<char, 4096> text{};
     alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(ucred))> control{};
     iovec part{text.data(), text.size()};
@@ -39,14 +40,15 @@ std::optional<pid_t> NotifySocket::takeReady() const {
     message.msg_control = control.data();
     message.msg_controllen = control.size();
     const auto length = ::recvmsg(socket_.get(), &message, MSG_CMSG_CLOEXEC);
-    if (length < 0) return std::nullopt;
+    if (length < 0) break;
     const std::string report = "\n" + std::string(text.data(), static_cast<std::size_t>(length));
     const auto* const header = CMSG_FIRSTHDR(&message);
     if (header == nullptr || header->cmsg_type != SCM_CREDENTIALS) continue;
     ucred sender{};
     std::memcpy(&sender, CMSG_DATA(header), sizeof sender);
-    if (report.find("\nREADY=1") != std::string::npos) return sender.pid;
+    if (report.find("\nREADY=1") != std::string::npos) ready.push_back(sender.pid);
   }
+  return ready;
 }
 
 }  // namespace mpf::crate

@@ -2,16 +2,18 @@
 // NotifySocket: the supervisor's end of sd_notify(3), by which a process that has no servers, such
 // as a router or an IOC, reports that it is ready.
 //
-//   process ─ "READY=1" to $NOTIFY_SOCKET ─► takeReady() = its pid
+//   process ─ "READY=1" to $NOTIFY_SOCKET ─► takeReady() = {its pid}
 //
 // Threads  one.
-// Trust    any process of the host may send to the socket; the kernel adds the sender's pid.
+// Trust    any process of the host may send to the socket, as much as it likes; the kernel adds the
+//          sender's pid.
 #pragma once
 
 #include <sys/types.h>
 
-#include <optional>
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include <mpf/file_descriptor.h>
 
@@ -19,6 +21,10 @@ namespace mpf::crate {
 
 class NotifySocket {
  public:
+  // Datagrams that takeReady() reads at most, so that a sender that never pauses cannot keep its
+  // caller from its other work.
+  static constexpr std::size_t kMaxReports = 8;
+
   //   throws  std::system_error
   NotifySocket();
 
@@ -26,8 +32,9 @@ class NotifySocket {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   // Readable while a report waits.
   [[nodiscard]] int descriptor() const noexcept { return socket_.get(); }
-  // The pid of the next process that has reported that it is ready; nullopt: none has.
-  [[nodiscard]] std::optional<pid_t> takeReady() const;
+  // The pids of processes that have reported that they are ready. Further reports may wait; then
+  // the descriptor is still readable.
+  [[nodiscard]] std::vector<pid_t> takeReady() const;
 
  private:
   FileDescriptor socket_;

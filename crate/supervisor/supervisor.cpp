@@ -295,11 +295,13 @@ std::string Supervisor::whatIsMissing(const Member& member) const {
 }
 
 void Supervisor::takeReports() {
-  while (const auto pid = notify_.takeReady()) {
-    for (const auto& member : members_)
-      if (member->service.pid() == *pid) member->isNotified = true;
+  for (const auto pid : notify_.takeReady()) {
+    for (const auto& member : members_) {
+      if (member->service.pid() != pid || member->isNotified) continue;
+      member->isNotified = true;
+      nextLookNs_ = 0;
+    }
   }
-  nextLookNs_ = 0;
 }
 
 void Supervisor::noteProblem(std::string_view what) {

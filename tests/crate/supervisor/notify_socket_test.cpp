@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/service_manager.h"
@@ -13,23 +14,38 @@
 namespace mpf::crate::test {
 namespace {
 
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
 TEST(NotifySocket, ReturnsThePidOfAProcessThatIsReady) {
   const NotifySocket socket;
   ::setenv("NOTIFY_SOCKET", socket.name().c_str(), 1);
-  EXPECT_EQ(socket.takeReady(), std::nullopt);
+  EXPECT_THAT(socket.takeReady(), IsEmpty());
 
   ServiceManager::notifyStatus("starting");
   ServiceManager::notifyReady();
 
-  EXPECT_EQ(socket.takeReady(), ::getpid());
-  EXPECT_EQ(socket.takeReady(), std::nullopt);
+  EXPECT_THAT(socket.takeReady(), ElementsAre(::getpid()));
+  EXPECT_THAT(socket.takeReady(), IsEmpty());
   const auto child = ::fork();
   if (child == 0) {
     ServiceManager::notifyReady();
     ::_exit(0);
   }
   ::waitpid(child, nullptr, 0);
-  EXPECT_EQ(socket.takeReady(), child);
+  EXPECT_THAT(socket.takeReady(), ElementsAre(child));
+  ::unsetenv("NOTIFY_SOCKET");
+}
+
+// The supervisor does its other work in between, however many reports wait.
+TEST(NotifySocket, TakesALimitedNumberOfReports) {
+  const NotifySocket socket;
+  ::setenv("NOTIFY_SOCKET", socket.name().c_str(), 1);
+  for (std::size_t i = 0; i <= NotifySocket::kMaxReports; ++i) ServiceManager::notifyReady();
+
+  EXPECT_THAT(socket.takeReady(), SizeIs(NotifySocket::kMaxReports));
+  EXPECT_THAT(socket.takeReady(), SizeIs(1));
   ::unsetenv("NOTIFY_SOCKET");
 }
 

@@ -157,7 +157,7 @@ TEST_F(SupervisorTest, TellsSystemdThatItIsReadyAlthoughAProcessFailsForEver) {
       "max-restarts = 1000000\n");
   ::unsetenv("NOTIFY_SOCKET");
 
-  while (!systemd.takeReady()) continue;
+  while (systemd.takeReady().empty()) continue;
   EXPECT_EQ(stateOf("int32"), "ready");
   EXPECT_EQ(stateOf("user"), "waiting");
 }
