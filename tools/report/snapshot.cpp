@@ -11,6 +11,7 @@
 #include <mpf/clock.h>
 
 #include "base/printable.h"
+#include "base/saturating.h"
 #include "shm/histogram.h"
 #include "shm/segment.h"
 #include "shm/segment_name.h"
@@ -147,7 +148,7 @@ class SnapshotReader {
     view.life = lifeOf(name, *image);
     view.sleeping = value(image->window().sleeping);
     if (view.life != Life::dead) view.processState = processState(view.owner);
-    view.ageNs = snapshot_.atNs - header.createdMonotonicNs;
+    view.ageNs = saturatingDifference(snapshot_.atNs, header.createdMonotonicNs);
     view.queueSize = view.isServer ? value(image->window().queueSize) : header.queueSize;
     view.maxMessageBytes = header.maxMessageBytes;
     copyCounters(image->window(), view);
@@ -253,7 +254,7 @@ class SnapshotReader {
     std::ranges::sort(snapshot_.servers, {},
                       [](const WindowView& view) { return std::pair(view.location, view.name); });
     std::ranges::sort(snapshot_.clients, {}, [](const WindowView& view) {
-      return std::pair(-view.ageNs, view.incarnation);
+      return std::pair(saturatingDifference(0, view.ageNs), view.incarnation);
     });
     std::ranges::sort(snapshot_.routers, {}, [](const RouterView& view) {
       return std::pair(view.name, view.incarnation);

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/saturating.h"
 #include "schema/conversion.h"
 #include "schema/visit.h"
 #include "tools/tap/recording.h"
@@ -85,7 +86,7 @@ class GhostScript::Reading {
       exchanges.push_back({.atNs = atNs, .replies = {}});
     } else if (const auto asked = byRequest_.find(id); asked != byRequest_.end()) {
       auto& exchange = exchanges[asked->second];
-      exchange.replies.push_back({.after = Nanoseconds(atNs - exchange.atNs),
+      exchange.replies.push_back({.after = Nanoseconds(saturatingDifference(atNs, exchange.atNs)),
                                   .atNs = atNs,
                                   .message = std::move(*message)});
     }

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "base/saturating.h"
 #include "tools/tap/pace.h"
 
 namespace mpf::tools {
@@ -69,7 +70,8 @@ bool GhostServer::trySend(Answering& answering) {
   reply.setClientType(answering.request.getClientType());
   reply.setClientExtra(answering.request.getClientExtra());
   if (reply.getTimeStampNs() != 0)
-    reply.setTimeStampNs(reply.getTimeStampNs() + Clock::wallNs() - recorded.atNs);
+    reply.setTimeStampNs(saturatingSum(reply.getTimeStampNs(),
+                                       saturatingDifference(Clock::wallNs(), recorded.atNs)));
   auto route = answering.request.route();
   route.keeper = nullptr;
   reply.setRoute(route);

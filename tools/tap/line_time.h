@@ -12,6 +12,8 @@
 #include <optional>
 #include <string>
 
+#include "base/saturating.h"
+
 namespace mpf::tools {
 
 class LineTime {
@@ -22,8 +24,8 @@ class LineTime {
   //   atNs  CLOCK_MONOTONIC
   [[nodiscard]] std::string of(std::int64_t atNs) {
     constexpr std::int64_t kSecond = 1'000'000'000;
-    const auto wallNs = atNs + offsetNs_;
-    const auto sinceNs = lastNs_ ? atNs - *lastNs_ : 0;
+    const auto wallNs = saturatingSum(atNs, offsetNs_);
+    const auto sinceNs = lastNs_ ? saturatingDifference(atNs, *lastNs_) : 0;
     lastNs_ = atNs;
     return fmt::format("{:%H:%M:%S}.{:03} {:>+10.1f} ms",
                        fmt::localtime(static_cast<std::time_t>(wallNs / kSecond)),

@@ -17,6 +17,7 @@
 #include "base/duration_text.h"
 #include "base/latency_recorder.h"
 #include "base/print_error.h"
+#include "base/saturating.h"
 #include "base/stop_signals.h"
 #include "schema/conversion.h"
 #include "tools/arguments.h"
@@ -116,7 +117,8 @@ class Replayer {
       startNs_ = nowNs;
     }
     if (arguments_.speed <= 0) return;
-    const auto dueNs = startNs_ + replayedNs(atNs - firstAtNs_, arguments_.speed);
+    const auto dueNs =
+        startNs_ + replayedNs(saturatingDifference(atNs, firstAtNs_), arguments_.speed);
     while (!stopped_ && Clock::nowNs() < dueNs) dispatcher_.runOnce(Deadline::atNs(dueNs));
     late_->add(static_cast<std::uint64_t>(std::max<std::int64_t>(0, Clock::nowNs() - dueNs)));
   }
