@@ -70,10 +70,11 @@ bool prepare(TopView& view, const TopArguments& arguments) {
 int printBatch(const TopArguments& arguments) {
   SnapshotSeries series(arguments.backplane);
   TopView view;
+  view.show(series.next());
+  if (!prepare(view, arguments)) return 2;  // before the first pause
   for (int i = 0; i < arguments.batch; ++i) {
     std::this_thread::sleep_for(arguments.interval);
     view.show(series.next());
-    if (i == 0 && !prepare(view, arguments)) return 2;
     if (i != 0) fmt::print("\n");
     for (const auto& line : view.lines(0)) fmt::print("{}\n", line.text);
     std::fflush(stdout);

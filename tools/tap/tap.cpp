@@ -104,14 +104,15 @@ void addTap(CLI::App& app, Run& run) {
       ->check(wholeNumber(0));
   command.add_option("--link", arguments->link,
                      "Only this link: its hexadecimal number, or at least its first 6 digits");
-  command
-      .add_option("--write", arguments->file,
-                  "Write to this file, for `mpf replay`, instead of to stdout")
-      ->type_name("FILE");
+  auto* const write = command
+                          .add_option("--write", arguments->file,
+                                      "Write to this file, for `mpf replay`, instead of to stdout")
+                          ->type_name("FILE");
   addTime(command, "--poll", arguments->poll,
           "Longest pause between two reads of links without new messages", kAboveZero);
-  command.add_flag("--print", arguments->printAll, "Print arrays in full");
+  command.add_flag("--print", arguments->printAll, "Print arrays in full")->excludes(write);
   addJson(command, arguments->json);
+  command.get_option("--json")->excludes(write);
   command.footer(
       "->: a request; <-: the reply that ends it; < : another message of the server. The number is "
       "the request's.\n"
