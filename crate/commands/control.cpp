@@ -69,12 +69,21 @@ std::string lastWords(const json& process) try {
   return {};
 }
 
+// Sends a request to the supervisor, which has the time until the deadline to reply; but never less
+// than it needs when it is busy, so that `--wait 0` sends the request without waiting for its
+// result.
+json ask(const CrateFolder& folder, const Deadline& deadline, const json& request) {
+  constexpr std::chrono::milliseconds kLeastPatience{2000};
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
+  return askSupervisor(folder, request, std::max(left, kLeastPatience));
+}
+
 // Waits until the process is in one of the states in which nothing more happens, and prints it.
 //   throws  std::runtime_error when it has failed, or is in another state at the deadline
 void waitFor(const CrateFolder& folder, const ControlArguments& arguments, const Deadline& deadline,
              bool isStop, int pidBefore) {
   for (;;) {
-    const auto process = processOf(askSupervisor(folder, {{"do", "ps"}}), arguments.process);
+    const auto process = processOf(ask(folder, deadline, {{"do", "ps"}}), arguments.process);
     const auto state = process.value("state", "gone");
     const auto isNew = process.value("pid", 0) != pidBefore;
     if (state == "stopped" || state == "gone" || (!isStop && isNew && isReady(process))) {
@@ -111,22 +120,22 @@ void printDependants(const json& report, const std::string& name) {
 int controlProcess(const std::string& what, const ControlArguments& arguments) {
   const auto folder = chooseCrate(arguments.crate);
   const auto& name = arguments.process;
-  const auto before = processOf(askSupervisor(folder, {{"do", "ps"}}), name).value("pid", 0);
-  askSupervisor(folder, {{"do", what}, {"name", name}});
-  waitFor(folder, arguments, Deadline::after(arguments.wait), what == "stop",
-          what == "restart" ? before : 0);
-  if (what == "stop") printDependants(askSupervisor(folder, {{"do", "ps"}}), name);
+  const auto deadline = Deadline::after(arguments.wait);
+  const auto before = processOf(ask(folder, deadline, {{"do", "ps"}}), name).value("pid", 0);
+  ask(folder, deadline, {{"do", what}, {"name", name}});
+  waitFor(folder, arguments, deadline, what == "stop", what == "restart" ? before : 0);
+  if (what == "stop") printDependants(ask(folder, deadline, {{"do", "ps"}}), name);
   return 0;
 }
 
 int reload(ControlArguments arguments) {
   const auto folder = chooseCrate(arguments.crate);
-  const auto reply = askSupervisor(folder, {{"do", "reload"}});
+  const auto deadline = Deadline::after(arguments.wait);
+  const auto reply = ask(folder, deadline, {{"do", "reload"}});
   const auto changed = reply.value("changed", std::vector<std::string>());
   fmt::print("the crate \"{}\" is reloaded{}\n", folder.name(),
              changed.empty() ? "; no process is started or restarted" : "");
   std::fflush(stdout);
-  const auto deadline = Deadline::after(arguments.wait);
   int status = 0;
   for (const auto& name : changed) {
     arguments.process = name;
@@ -142,8 +151,8 @@ int reload(ControlArguments arguments) {
 
 int stopCrate(const ControlArguments& arguments) {
   const auto folder = chooseCrate(arguments.crate);
-  askSupervisor(folder, {{"do", "shutdown"}});
   const auto deadline = Deadline::after(arguments.wait);
+  ask(folder, deadline, {{"do", "shutdown"}});
   while (folder.isLocked()) {
     if (deadline.hasPassed())
       throw std::runtime_error(

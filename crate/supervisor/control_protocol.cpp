@@ -19,6 +19,7 @@
 
 #include "base/process_stat.h"
 #include "base/system_call.h"
+#include "base/time_text.h"
 #include "base/toml/config_errors.h"
 
 namespace mpf::crate {
@@ -63,40 +64,49 @@ void checkNotStopped(pid_t pid, const std::string& crate) {
       crate, pid, pid));
 }
 
-void checkDeadline(const Deadline& deadline, const std::string& crate) {
-  if (deadline.hasPassed())
-    throw std::runtime_error(fmt::format(
-        "the supervisor of the crate \"{}\" does not reply; try again, or see its log", crate));
-}
+// The wait for the reply of the supervisor of a crate.
+struct Wait {
+  std::string crate;
+  std::chrono::milliseconds patience;
+  Deadline deadline = Deadline::after(patience);
+
+  void checkDeadline() const {
+    if (deadline.hasPassed())
+      throw std::runtime_error(
+          fmt::format("the supervisor of the crate \"{}\" does not reply within {}; try again, or "
+                      "see its log",
+                      crate, timeText(patience)));
+  }
+};
 
 // Waits while the queue of the socket is full: the supervisor is busy or stopped.
-void connectTo(int socket, const CrateFolder& folder, const Deadline& deadline) {
+void connectTo(int socket, const CrateFolder& folder, const Wait& wait) {
   const SocketAddress address(folder);
   while (::connect(socket, address.get(), sizeof address.address) != 0) {
     if (errno != EAGAIN) throwSystemError(errno, "connect", folder.file("control"));
     checkNotStopped(folder.lockHolder().value_or(0), folder.name());
-    checkDeadline(deadline, folder.name());
+    wait.checkDeadline();
     std::this_thread::sleep_for(kConnectEvery);
   }
 }
 
-void waitForReply(int socket, const Deadline& deadline, const std::string& crate) {
+void waitForReply(int socket, const Wait& wait) {
   for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(wait.deadline.left());
     pollfd poll{socket, POLLIN, 0};
-    const auto wait = std::min(left, kLookAtSupervisorEvery);
-    if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(wait.count())); }) > 0)
+    const auto next = std::min(left, kLookAtSupervisorEvery);
+    if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(next.count())); }) > 0)
       return;
-    checkNotStopped(peerOf(socket), crate);
-    checkDeadline(deadline, crate);
+    checkNotStopped(peerOf(socket), wait.crate);
+    wait.checkDeadline();
   }
 }
 
-std::string readLine(int socket, const Deadline& deadline, const std::string& crate) {
+std::string readLine(int socket, const Wait& wait) {
   std::string text;
   std::array<char, 4096> bytes{};
   for (;;) {
-    waitForReply(socket, deadline, crate);
+    waitForReply(socket, wait);
     const auto length =
         retryInterrupted([&] { return ::read(socket, bytes.data(), bytes.size()); });
     if (length <= 0) return text;
@@ -120,13 +130,13 @@ FileDescriptor listenForControl(const CrateFolder& folder) {
 nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& request,
                              std::chrono::milliseconds patience) try {
   const auto socket = makeSocket();
-  const auto deadline = Deadline::after(patience);
-  connectTo(socket.get(), folder, deadline);
+  const Wait wait{folder.name(), patience};
+  connectTo(socket.get(), folder, wait);
   const auto text = request.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   // EPIPE: the supervisor has refused us already; its reply says why.
   if (::send(socket.get(), text.data(), text.size(), MSG_NOSIGNAL) < 0 && errno != EPIPE)
     throwSystemError(errno, "send", folder.file("control"));
-  auto reply = nlohmann::json::parse(readLine(socket.get(), deadline, folder.name()));
+  auto reply = nlohmann::json::parse(readLine(socket.get(), wait));
   if (reply.contains("fileErrors")) throw ConfigError(reply.at("fileErrors").get<std::string>());
   if (reply.contains("error")) throw std::runtime_error(reply.at("error").get<std::string>());
   return reply;

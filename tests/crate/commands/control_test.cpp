@@ -136,6 +136,20 @@ TEST_F(ControlTest, AStopFailsWhenTheSupervisorIsKilledBeforeItsProcesses) {
   ::kill(pid, SIGKILL);
 }
 
+TEST_F(ControlTest, TheTimeToWaitIsAlsoThatOfASupervisorThatDoesNotReply) {
+  const CrateFolder silent = CrateFolder::of("silent");
+  silent.create();
+  const auto lock = silent.lock();
+  const auto listening = listenForControl(silent);
+
+  for (const std::string command : {"stop x", "start x", "restart x", "stop", "reload"}) {
+    const auto result = runCommand(MPF " " + command + " --crate silent --wait 1ms 2>&1");
+
+    EXPECT_EQ(WEXITSTATUS(result.status), 1);
+    EXPECT_THAT(result.output, HasSubstr("does not reply within 2s;"));
+  }
+}
+
 TEST_F(ControlTest, AProcessThatIsNotReadySaysWhatIsMissing) {
   run("[[program]]\nname = \"mute\"\ncommand = [\"sleep\", \"1000\"]\nservers = [\"never\"]\n"
       "start-time = \"1ms\"\n");

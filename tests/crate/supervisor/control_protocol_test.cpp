@@ -111,7 +111,7 @@ TEST_F(ControlProtocolTest, DoesNotWaitForeverForAReply) {
 
   EXPECT_THAT([&] { askSupervisor(folder_, {{"do", "ps"}}, 10ms); },
               ThrowsMessage<std::runtime_error>(
-                  HasSubstr("the supervisor of the crate \"lab\" does not reply")));
+                  HasSubstr("the supervisor of the crate \"lab\" does not reply within 10ms")));
 }
 
 TEST_F(ControlProtocolTest, WaitsWhileASupervisorHasManyCallers) {
