@@ -212,7 +212,9 @@ void Supervisor::reapChildren() {
   }
 }
 
+// Many processes may end together, and the core of each may take seconds to read.
 void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
+  reportAlive();
   auto& service = member.service;
   const auto pid = service.pid();
   const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
@@ -357,9 +359,13 @@ void Supervisor::wait() {
   if (Clock::nowNs() >= nextLookNs_) look();
 }
 
+void Supervisor::reportAlive() {
+  if (ServiceManager::watchdogTime()) ServiceManager::notifyAlive();
+}
+
 // After act(): a process that still waits needs one that is not ready.
 void Supervisor::reportStatus() {
-  if (ServiceManager::watchdogTime()) ServiceManager::notifyAlive();
+  reportAlive();
   if (isShuttingDown_) ServiceManager::notifyStillStopping();
   std::size_t ready = 0;
   bool isSettled = true;

@@ -95,6 +95,7 @@ class Supervisor {
   [[nodiscard]] nlohmann::json describe() const;
   void wait();
   [[nodiscard]] int waitMs() const;
+  static void reportAlive();
   void reportStatus();
   [[nodiscard]] bool areNeedsReady(const Service& service) const;
   // Whether a process that runs needs this one.
