@@ -27,6 +27,8 @@ using Keys = std::set<std::string>;
 
 // All programs together.
 constexpr std::chrono::seconds kLongestCheck{20};
+// Programs that run at the same time. Each needs a descriptor, of which a process often has 1024.
+constexpr std::size_t kMostAtOnce = 64;
 
 // What is wrong with a user; empty: nothing.
 std::string problemOfUser(const std::string& user) {
@@ -101,11 +103,13 @@ class StartCheck {
   void run() {
     for (const auto& carrier : crate_.carriers)
       check(carrier.place, [&] { checkCarrier(carrier.kind); });
-    for (const auto& process : crate_.processes)
+    const auto deadline = Deadline::after(kLongestCheck);
+    for (const auto& process : crate_.processes) {
+      while (programs_.size() >= kMostAtOnce) takeFirst(deadline);
       if (process.isSound) checkProcess(process);
       else if (process.kind.empty() && !process.command.empty()) checkProgram(process);
-    const auto deadline = Deadline::after(kLongestCheck);
-    for (; !programs_.empty(); programs_.pop_front()) takeErrors(programs_.front(), deadline);
+    }
+    while (!programs_.empty()) takeFirst(deadline);
   }
 
  private:
@@ -179,6 +183,11 @@ class StartCheck {
                        program.find(' ') != std::string::npos
                            ? R"(; write command = ["PROGRAM", "ARGUMENT", ...])"
                            : "");
+  }
+
+  void takeFirst(const Deadline& deadline) {
+    takeErrors(programs_.front(), deadline);
+    programs_.pop_front();
   }
 
   // The first line decides the place: "queuesize: ..." or "--queuesize: ...".

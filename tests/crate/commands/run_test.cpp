@@ -262,6 +262,20 @@ TEST_F(RunCheckTest, SuchErrorsAreFoundIfTheParentIgnoresTheEndsOfChildren) {
   EXPECT_THAT(result.output, HasSubstr("queue-size: 0 is out of range"));
 }
 
+TEST_F(RunCheckTest, TheProgramsOfALargeCrateDoNotNeedADescriptorEach) {
+  std::string text;
+  for (int i = 0; i < 150; ++i)
+    text += kServer + fmt::format("name = \"a{0}\"\nlocation = {0}\n", i);
+  static_cast<void>(files_.write("lab.toml", text + "queue-size = 0\n"));
+
+  const auto result = mpf::test::runCommand("ulimit -n 100; cd " + files_.path().string() +
+                                            " && " MPF " run --check lab.toml 2>&1");
+
+  EXPECT_EQ(WEXITSTATUS(result.status), 2);
+  EXPECT_THAT(result.output, HasSubstr("queue-size: 0 is out of range"));
+  EXPECT_THAT(result.output, testing::Not(HasSubstr("pipe2")));
+}
+
 TEST_F(RunCheckTest, AReloadWithSuchErrorsChangesNothing) {
   run(kServer);
   waitForState("int32", "ready");
