@@ -97,10 +97,7 @@ std::uint32_t hytecMemoryBase(const ParameterText& text, std::uint32_t slot,
     if (base % all != 0)
       text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: use a multiple of 0x{:x}",
                               *memory.high, memory.megabytes, all >> 16));
-    if (*memory.high + (all >> 16) > 0xffff)
-      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: the end is beyond A32", *memory.high,
-                              memory.megabytes));
-    return base;
+    return base;  // such memory ends within A32, or exactly with it
   }
   if (memory.megabytes == 4) text.refuse("IPMEM 4 needs a MEMBASE");
   if (memory.megabytes == 2 && slot > 15)

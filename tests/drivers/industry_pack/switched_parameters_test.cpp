@@ -27,6 +27,12 @@ constexpr GoodParameters kGoodSwitched[]{
     {"hy8004", "3,2 IPMEM=2, MEMBASE=0x9000,IPCLCK=32 ROAK=1",
      "1800 1880 90000000+2048K 2,2; 1900 1980 90200000+2048K 2,2; 1a00 1a80 90400000+2048K 2,2; "
      "1b00 1b80 90600000+2048K 2,2"},
+    {"hy8004", "3,2 MEMBASE=0xffc0",
+     "1800 1880 ffc00000+1024K 2,2; 1900 1980 ffd00000+1024K 2,2; 1a00 1a80 ffe00000+1024K 2,2; "
+     "1b00 1b80 fff00000+1024K 2,2"},
+    {"hy8004", "3,2 IPMEM=4 MEMBASE=0xff00",
+     "1800 1880 ff000000+4096K 2,2; 1900 1980 ff400000+4096K 2,2; 1a00 1a80 ff800000+4096K 2,2; "
+     "1b00 1b80 ffc00000+4096K 2,2"},
     {"hy8002", "1,0 IPMEM=8 IPCLK=8",
      "800 880 8000000+8192K 0,0; 900 980 8800000+8192K 0,0; a00 a80 9000000+8192K 0,0; b00 b80 "
      "9800000+8192K 0,0"},
@@ -64,8 +70,6 @@ constexpr BadParameters kBadSwitched[]{
     {"hy8002", "16,2 IPMEM=2", IndustryPackStatus::badAddress,
      "IPMEM 2 in slot 16 needs a MEMBASE"},
     {"hy8002", "3,2 IPMEM=4 MEMBASE=0x9080", IndustryPackStatus::badAddress, "a multiple of 0x100"},
-    {"hy8002", "3,2 IPMEM=1 MEMBASE=0xffc0", IndustryPackStatus::badAddress,
-     "the end is beyond A32"},
     {"hy8002", "3,2 MEMBASE=0x10000", IndustryPackStatus::badAddress, "MEMBASE 0x10000"},
     {"hy8004", "3,2 IPCLK=16", IndustryPackStatus::badAddress, "IPCLK 16: use 8 or 32"},
     {"hy8004", "3,2 ROAK=2", IndustryPackStatus::badAddress, "ROAK 2"},
