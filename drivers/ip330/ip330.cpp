@@ -201,8 +201,10 @@ std::optional<bool> Ip330::calibrate(int gain) {
   return correction.has_value();
 }
 
-// Makes the keeper calibrate again after the delay of a retry.
+// Makes the keeper calibrate again after the delay of a retry, unless calibration is off: then no
+// sample uses the result, and a retry would only stop the scans.
 void Ip330::calibrateSoon() {
+  if (settings_.secondsBetweenCalibrate < 0) return;
   calibrateAt_ = std::min(calibrateAt_, Deadline::after(limits_.silence));
 }
 

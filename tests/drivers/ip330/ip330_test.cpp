@@ -225,6 +225,21 @@ TEST_F(Ip330FaultTest, ABoardThatStopsScanningIsSilentUntilItScans) {
   waitForScans(10);
 }
 
+// Without calibration no sample uses the result, and each calibration stops the scans.
+TEST(Ip330WithoutCalibration, DoesNotRepeatAFailedCalibration) {
+  auto limits = kWatchful;
+  limits.silence = 5ms;
+  Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = -1}, {.isRealTime = true}, limits);
+  with.model.setStuck(true);
+
+  EXPECT_FALSE(with.board.tryCalibrate());
+
+  with.model.setStuck(false);
+  const auto before = with.board.counters().scans;
+  while (with.board.counters().scans < before + 10) std::this_thread::yield();
+  EXPECT_EQ(with.board.counters().calibrations, 1);
+}
+
 // Each failed calibration restarts the scans; a restart does not count as a scan.
 TEST_F(Ip330FaultTest, ABoardIsSilentWhileItsCalibrationFailsRepeatedly) {
   with_.model.setStuck(true);
