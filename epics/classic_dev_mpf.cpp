@@ -13,6 +13,7 @@
 
 #include "classic/messages/transfer.h"
 #include "epics/record_queue.h"
+#include "epics/shared_client.h"
 
 using mpf::classic::Transfer;
 
@@ -116,6 +117,8 @@ void DevMpf::connectIO(dbCommon* record, const mpf::Connect& connect) {
 }
 
 void DevMpf::outOfBandIO(dbCommon* record, mpf::Message&& message) {
+  if (mpf::SharedClient::replyTypeOf(message) == replyTypeReceiveReply)
+    static_cast<void>(takeSentType(message));  // in place of the reply it ends the request
   auto received = Transfer::receive(std::move(message));
   if (received) outOfBandIO(record, static_cast<OutOfBandMessage*>(received.release()));
 }

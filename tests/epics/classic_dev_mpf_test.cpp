@@ -91,6 +91,8 @@ class ClassicDevMpfTest : public EpicsTest {
     Probe::outOfBand = 0;
     Probe::sendsMore = false;
     Probe::greetsTwice = false;
+    Probe::float64s = 0;
+    Probe::int32s = 0;
   }
   static std::string manual(const std::string& fields) {
     return "device(ai, VME_IO, devAiManual, \"manual\")\n"
@@ -239,6 +241,19 @@ TEST_F(ClassicDevMpfTest, FurtherRepliesProcessTheRecord) {
 
   Ioc::waitFor("v", "3");
   kept.reset();
+}
+
+TEST_F(ClassicDevMpfTest, ANoticeInPlaceOfAReplyEndsItsRequest) {
+  Probe::greetsTwice = true;
+  const ThreadServer server(backplane_, "device", [](MessageServer& self, Message&& request) {
+    if (request.getType() != MessageType::float64) return;  // refuses it
+    static_cast<void>(self.reply(self.allocReplyMessage<OutOfBand>(request)));
+  });
+  const Ioc ioc(probe(""));
+
+  while (Probe::float64s + Probe::int32s == 0) std::this_thread::yield();
+
+  EXPECT_EQ(Probe::int32s, 1) << "the type of the other request";
 }
 
 }  // namespace
