@@ -2,7 +2,8 @@
 // Device support of a GreenSpring IP-Unidig: DTYP "Greenspring IP-Unidig".
 //
 //   longin  INP "#C<location> S0 @<module>In"        all inputs; subscribes when it processes, with
-//                                                    SCAN "I/O Intr" when the server connects
+//                                                    SCAN "I/O Intr" when the server connects, and
+//                                                    when SCAN becomes "I/O Intr"
 //   bi      INP "#C0 S<bit> @<name of the longin>"   SCAN "I/O Intr": one bit of that record
 //   bo      OUT "#C<location> S<bit> @<module>Out"   one output
 //
@@ -10,6 +11,7 @@
 #include <alarm.h>
 #include <biRecord.h>
 #include <boRecord.h>
+#include <callback.h>
 #include <dbAccess.h>
 #include <dbScan.h>
 #include <dbStaticLib.h>
@@ -81,6 +83,14 @@ class DevLiUnidig final : public DevMpf {
   static long init(dbCommon* record) {
     return bindDevice<DevLiUnidig>(reinterpret_cast<longinRecord*>(record));
   }
+  // The entry of the device support table for SCAN "I/O Intr". A record that gets this SCAN while
+  // the IOC runs processes soon, not now: the field is being written.
+  static long ioScanOf(int isRemoved, dbCommon* record, IOSCANPVT* scan) {
+    const auto status = getIoIntInfo(isRemoved, record, scan);
+    if (status == 0 && isRemoved == 0 && interruptAccept != FALSE)
+      callbackRequestProcessCallback(&of(record)->subscribe_, record->prio, record);
+    return status;
+  }
   // The entry of the device support table: its result, unless it waits for a reply, is that of the
   // bi records as well.
   static long read(dbCommon* record) {
@@ -104,12 +114,13 @@ class DevLiUnidig final : public DevMpf {
   }
 
   IOSCANPVT bits_ = nullptr;
+  epicsCallback subscribe_{};
   mutable std::mutex mutex_;
   InputState state_;  // under mutex_
 };
 
 MpfDset devLiUnidig{
-    {5, nullptr, nullptr, DevLiUnidig::init, DevMpf::getIoIntInfo}, DevLiUnidig::read, nullptr};
+    {5, nullptr, nullptr, DevLiUnidig::init, DevLiUnidig::ioScanOf}, DevLiUnidig::read, nullptr};
 
 class DevBoUnidig final : public DevMpf {
  public:

@@ -68,6 +68,24 @@ TEST_F(UnidigRecordTest, InputsWithIoEventScanningSubscribeOnceAndFollowEachChan
   }
 }
 
+TEST_F(UnidigRecordTest, InputsSubscribeWhenTheyAreChangedToIoEventScanning) {
+  const ThreadServer server(backplane_, "c-UnidigIn", [](MessageServer& self, Message&& request) {
+    request.tryAs<Int32>()->value = 7;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(R"(
+    record(longin, "in") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @c-UnidigIn") }
+    record(longin, "other") { field(DTYP, "Greenspring IP-Unidig")
+      field(INP, "#C0 S1 @c-UnidigIn") field(SCAN, "I/O Intr") }
+  )");
+  Ioc::waitFor("other", "7");
+  EXPECT_EQ(Ioc::get("in"), "0");
+
+  ASSERT_EQ(Ioc::put("in.SCAN", "I/O Intr"), 0);
+
+  Ioc::waitFor("in", "7");
+}
+
 TEST_F(UnidigRecordTest, OutputsSetAndClearTheirBit) {
   std::atomic<std::int32_t> outputs = 0xff;
   const ThreadServer server(backplane_, "c-UnidigOut", [&](MessageServer& self, Message&& request) {
