@@ -64,7 +64,7 @@ std::size_t PyRequest::sendMany(std::span<PyMessage* const> messages,
 
 nb::object PyRequest::wait(bool check) {
   bool wasInterrupted = false;
-  if (!exchange_.hasEnded()) {
+  if (!hasEnded()) {
     const auto requester = connection_->requester();
     WithoutGil unlocked;
     requester->waitForEnd(exchange_, deadline_, unlocked.interruption());
@@ -74,9 +74,11 @@ nb::object PyRequest::wait(bool check) {
   return finish(check);
 }
 
-nb::object PyRequest::result(bool check) {
-  if (!connection_->isClosed() && !connection_->requester()->hasEnded(exchange_)) return nb::none();
-  return finish(check);
+nb::object PyRequest::result(bool check) { return hasEnded() ? finish(check) : nb::none(); }
+
+// Asks the requester: another thread may write the exchange now.
+bool PyRequest::hasEnded() const {
+  return connection_->isClosed() || connection_->requester()->hasEnded(exchange_);
 }
 
 // The exchange has ended.

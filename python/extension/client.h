@@ -51,6 +51,7 @@ class PyRequest {
   [[nodiscard]] bool isConnected() const;
 
  private:
+  [[nodiscard]] bool hasEnded() const;
   nb::object finish(bool check);
   // Until when sending waits for the connection.
   [[nodiscard]] Deadline connectBefore(bool waits) const noexcept {
