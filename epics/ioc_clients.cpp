@@ -26,7 +26,7 @@ void onInitHook(initHookState state) { IocClients::instance().onHook(state); }
 void IocClients::onHook(int state) {
   if (state == initHookAfterIocRunning) start();
   if (state == initHookAtShutdown) close();
-  if (state == initHookAfterShutdown) forget();
+  if (state == initHookBeforeFree) forget();
 }
 
 void IocClients::start() {

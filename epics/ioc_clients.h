@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 // IocClients: the connections and the device support objects of the IOC of this process.
 //
-//   starting ─ IOC runs ─► running ─ IOC shuts down ─► closed ─ IOC has shut down ─► starting
+//   starting ─ IOC runs ─► running ─ IOC shuts down ─► closed ─ IOC frees records ─► starting
 //   messages wait          callbacks are requested     no message is received
+//
+// Only the isolated IOC of a test frees its records, after it has stopped all that processes them.
+// The process of another IOC ends when the IOC is closed. Until then Channel Access, and before
+// Base 7.0.8 also scans and callbacks, may process records, so their devices are kept.
 //
 // Its thread runs the dispatcher of all connections. After each few messages it requests the
 // callbacks of their records, and every kTick it looks for requests without a reply in time. Every
@@ -54,7 +58,7 @@ class IocClients {
   [[nodiscard]] std::shared_ptr<SharedClient> connectionTo(const std::string& server,
                                                            std::int32_t location,
                                                            const std::string& user);
-  // Owns `owner` from now on, of which `device` is a part, until the IOC has shut down.
+  // Owns `owner` from now on, of which `device` is a part, until the IOC frees its records.
   void add(std::unique_ptr<DevMpf> owner, Device& device);
   // The queue of records with this PRIO. Its callback is requested soon, but not before the IOC
   // runs: that would process records too early.

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <epicsStdio.h>
 #include <gmock/gmock.h>
+#include <initHooks.h>
 #include <memory>
 
 #include "tests/epics/epics_fixture.h"
@@ -70,6 +71,22 @@ TEST_F(IocClientsTest, ConnectionsEndWithTheIoc) {
 
   const Ioc next("");
   EXPECT_NE(clients.connectionTo("adc", 0, ""), nullptr);
+}
+
+// Other IOCs announce the shutdown as well, while scans and clients may still process records.
+TEST_F(IocClientsTest, DevicesExistUntilRecordsAreFreed) {
+  const Ioc ioc("record(ai, \"a\") { field(DTYP, \"ip330Scan\") field(INP, \"#C0 S0 @adc\") }");
+  DBADDR address;
+  ASSERT_EQ(dbNameToAddr("a", &address), 0);
+  const auto* const device = address.precord->dpvt;
+  ASSERT_NE(device, nullptr);
+
+  IocClients::instance().onHook(initHookAtShutdown);
+  IocClients::instance().onHook(initHookAfterShutdown);
+
+  EXPECT_EQ(address.precord->dpvt, device);
+  static_cast<void>(Ioc::put("a.PROC", "1"));
+  EXPECT_EQ(Ioc::get("a.STAT"), "COMM");
 }
 
 }  // namespace
