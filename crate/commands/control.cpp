@@ -15,9 +15,11 @@
 
 #include <mpf/clock.h>
 
+#include "base/command_line.h"
 #include "base/print_error.h"
 #include "base/printable.h"
 #include "base/run_main.h"
+#include "base/time_text.h"
 #include "base/whole_file.h"
 #include "crate/commands/commands.h"
 #include "crate/supervisor/control_protocol.h"
