@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include <mpf/clock.h>
 #include <mpf/message_of.h>
 
 namespace mpf::tools {
