@@ -15,7 +15,7 @@ namespace mpf::crate {
   const auto upNs = service.isRunning() ? Clock::nowNs() - service.startedNs() : 0;
   nlohmann::json json{
       {"name", service.plan().name},        {"state", toString(service.state())},
-      {"is_stalled", service.isStalled()},   {"pid", service.pid()},
+      {"is_stalled", service.isStalled()},  {"pid", service.pid()},
       {"restarts", service.restarts()},     {"up_s", static_cast<double>(upNs) / 1e9},
       {"reason", service.reason()},         {"needs", service.plan().needs},
       {"servers", service.plan().servers},  {"command", service.plan().command},
