@@ -155,7 +155,7 @@ Binding::Control Binding::prepareControl(Message& message, Request* request) {
   if (!mayServerSend(message, request)) return Control::invalid;
   if (auto* connect = message.tryAs<Connect>()) connect->incarnation = connector_.incarnation();
   const auto* fate = message.tryAs<RequestFate>();
-  if (fate == nullptr || request == nullptr) return Control::deliver;  // a fate has a request
+  if (fate == nullptr || request == nullptr) return Control::deliver;  // only a fate has one
   // A router reports that the server behind it has not taken the request.
   if (fate->fate == Fate::neverTaken && sender_.tryKeep(*request)) {
     showAnswered();

@@ -9,9 +9,9 @@
 
 namespace mpf::router {
 
-// A router offers no server that it reaches over more connections between routers. Locations of
-// routers can form a cycle, on which they would otherwise announce each other's proxies of an ended
-// server for ever, each proxy one hop farther than the last.
+// A router offers no server that it reaches over so many connections between routers, or more.
+// Locations of routers can form a cycle, on which they would otherwise announce each other's
+// proxies of an ended server for ever, each proxy one hop farther than the last.
 inline constexpr std::uint32_t kMaxHops = 8;
 
 struct ServerName {

@@ -41,8 +41,8 @@ bool ServerMonitor::find() try {
   if (!window || window->isClosed() || !window->hasOwner()) return false;
   if (window->header().hops >= kMaxHops)
     throw std::runtime_error(
-        fmt::format("it is {} routers away, or the locations of routers form a cycle: connect the "
-                    "hosts directly, or change the locations",
+        fmt::format("{} connections between routers lead to it: connect the hosts directly, or, if "
+                    "the locations of routers form a cycle, change them",
                     window->header().hops));
   token_ = backplane_.watcher().watchPeer(window, onChange_);
   window_ = std::move(window);

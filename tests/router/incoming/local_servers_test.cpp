@@ -85,9 +85,9 @@ TEST_F(LocalServersTest, TellHowFarAServerIsAndDoNotOfferOneThatIsTooFar) {
   proxy.emplace(backplane_, "echo", ServerOptions{}, router::kMaxHops);
   lookAtAll();
 
-  EXPECT_THAT(nextItem(), AllOf(HasSubstr("absent"), HasSubstr("it is 8 routers away")));
-  EXPECT_THAT(logged_, HasSubstr("echo at location 1 cannot be offered to 10.0.0.7:40000: it is 8 "
-                                 "routers away"));
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("absent"), HasSubstr("8 connections between routers")));
+  EXPECT_THAT(logged_, HasSubstr("echo at location 1 cannot be offered to 10.0.0.7:40000: 8 "
+                                 "connections between routers lead to it"));
 }
 
 TEST_F(LocalServersTest, RefuseWhatIsNotServed) {
